@@ -1,0 +1,1 @@
+"""What flows: frames, sequences, registered frames, accumulations."""

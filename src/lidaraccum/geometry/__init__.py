@@ -1,0 +1,1 @@
+"""Pure functions of arrays: rigid motions, grids, voxels, clusters."""

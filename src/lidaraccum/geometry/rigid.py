@@ -1,0 +1,80 @@
+"""Rigid motions as 4 x 4 float64 matrices, named ``to_from``: ``to_from @ points_from``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+Pose = NDArray[np.float64]
+
+
+def transform(to_from: Pose, points: NDArray[Any]) -> NDArray[np.float64]:
+    """Move points (N, 3), metres, by a rigid motion (4, 4); float64 out."""
+    return np.asarray(points, dtype=np.float64) @ to_from[:3, :3].T + to_from[:3, 3]
+
+
+def invert(to_from: Pose) -> Pose:
+    """The motion back, from a (4, 4) rigid motion; (T, 4, 4) stacks are inverted one by one."""
+    inverse = np.zeros_like(to_from)
+    rotation_back = np.swapaxes(to_from[..., :3, :3], -1, -2)
+    inverse[..., :3, :3] = rotation_back
+    inverse[..., :3, 3] = -np.einsum("...ij,...j->...i", rotation_back, to_from[..., :3, 3])
+    inverse[..., 3, 3] = 1.0
+    return inverse
+
+
+def translation(shift: NDArray[Any] | tuple[float, float, float]) -> Pose:
+    """The motion (4, 4) that only shifts, metres."""
+    motion = np.eye(4)
+    motion[:3, 3] = shift
+    return motion
+
+
+def exponential(twist: NDArray[Any]) -> Pose:
+    """The motion (4, 4) of a constant twist (6,): rotation vector in radians, velocity in metres.
+
+    Exact on SE(3), so half the twist applied twice is the whole.
+    """
+    twist = np.asarray(twist, dtype=np.float64)
+    return exponentials(twist[None], np.ones(1))[0]
+
+
+def exponentials(twists: NDArray[Any], scales: NDArray[Any]) -> NDArray[np.float64]:
+    """Motions (M, 4, 4) of twists (M, 6) or (1, 6), each scaled by its own factor (M,)."""
+    scaled = np.asarray(twists, dtype=np.float64) * np.asarray(scales, dtype=np.float64)[:, None]
+    angle_axis, velocity = scaled[:, :3], scaled[:, 3:]
+    angle = np.linalg.norm(angle_axis, axis=1)
+    small = angle < 1e-8
+    safe = np.where(small, 1.0, angle)
+    one_minus_cos = np.where(small, 0.5, (1.0 - np.cos(safe)) / safe**2)
+    angle_minus_sin = np.where(small, 1.0 / 6.0, (safe - np.sin(safe)) / safe**3)
+    first = np.cross(angle_axis, velocity)
+    second = np.cross(angle_axis, first)
+    motions = np.tile(np.eye(4), (len(scaled), 1, 1))
+    motions[:, :3, :3] = Rotation.from_rotvec(angle_axis).as_matrix()
+    motions[:, :3, 3] = (
+        velocity + one_minus_cos[:, None] * first + angle_minus_sin[:, None] * second
+    )
+    return motions
+
+
+def logarithm(to_from: Pose) -> NDArray[np.float64]:
+    """The twist (6,) whose exponential is the motion (4, 4): radians, then metres."""
+    rotation_vector = Rotation.from_matrix(to_from[:3, :3]).as_rotvec()
+    angle = float(np.linalg.norm(rotation_vector))
+    shift = to_from[:3, 3]
+    cross = np.cross(rotation_vector, shift)
+    if angle < 1e-8:
+        velocity = shift - 0.5 * cross
+    else:
+        factor = (1.0 - 0.5 * angle * np.cos(angle / 2) / np.sin(angle / 2)) / angle**2
+        velocity = shift - 0.5 * cross + factor * np.cross(rotation_vector, cross)
+    return np.concatenate([rotation_vector, velocity])
+
+
+def rotation_angle(to_from: Pose) -> float:
+    """Angle of the motion's rotation, radians."""
+    return float(np.linalg.norm(Rotation.from_matrix(to_from[:3, :3]).as_rotvec()))

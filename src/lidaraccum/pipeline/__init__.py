@@ -1,0 +1,1 @@
+"""The method: frames in, one accumulation out."""

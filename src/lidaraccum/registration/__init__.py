@@ -1,0 +1,1 @@
+"""Points to poses: odometry, ICP, deskew. No network inside."""

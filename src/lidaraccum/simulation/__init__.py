@@ -1,0 +1,1 @@
+"""Labelled sequences out of a ray-cast world."""
