@@ -1,0 +1,1 @@
+"""How good a result is: pure functions of arrays, thresholds named with their source."""
