@@ -57,6 +57,7 @@ class AccumulatedFrame:
         stamp: Seconds, of the frame, as its source counts them.
         reference_from_sensor: (4, 4) pose of the sensor; takes the file's coordinates.
         attributes: What came with the points, (M,) each, ``intensity`` and ``ring`` among them.
+        name: What the frame is called, usually its file's name.
     """
 
     index: int
@@ -70,6 +71,7 @@ class AccumulatedFrame:
     stamp: float
     reference_from_sensor: rigid.Pose
     attributes: Mapping[str, NDArray[Any]]
+    name: str = ""
 
     def __post_init__(self) -> None:
         count = len(self.points)
