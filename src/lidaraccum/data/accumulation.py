@@ -54,6 +54,7 @@ class AccumulatedFrame:
         instance: (M,) int32, 0 for none.
         confidence: (M,) float32, 0..1, of the label.
         time: (M,) float64, seconds from the first frame's stamp.
+        range_m: (M,) float32, metres from the sensor.
         stamp: Seconds, of the frame, as its source counts them.
         reference_from_sensor: (4, 4) pose of the sensor; takes the file's coordinates.
         attributes: What came with the points, (M,) each, ``intensity`` and ``ring`` among them.
@@ -68,6 +69,7 @@ class AccumulatedFrame:
     instance: NDArray[np.int32]
     confidence: NDArray[np.float32]
     time: NDArray[np.float64]
+    range_m: NDArray[np.float32]
     stamp: float
     reference_from_sensor: rigid.Pose
     attributes: Mapping[str, NDArray[Any]]
@@ -75,7 +77,7 @@ class AccumulatedFrame:
 
     def __post_init__(self) -> None:
         count = len(self.points)
-        for name in ("rows", "label", "instance", "confidence", "time"):
+        for name in ("rows", "label", "instance", "confidence", "time", "range_m"):
             if getattr(self, name).shape != (count,):
                 raise InputError(f"{name} must be ({count},), not {getattr(self, name).shape}")
 
@@ -94,6 +96,7 @@ class AccumulatedFrame:
             instance=self.instance[keep],
             confidence=self.confidence[keep],
             time=self.time[keep],
+            range_m=self.range_m[keep],
             attributes={name: values[keep] for name, values in self.attributes.items()},
         )
 
