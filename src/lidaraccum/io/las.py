@@ -1,0 +1,123 @@
+"""LAS and LAZ 1.2 to 1.4 in: scale and offset, extra bytes, gps_time, coordinate system."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import laspy
+import numpy as np
+from laspy.errors import LaspyException
+from numpy.typing import NDArray
+
+from lidaraccum.errors import InputError
+from lidaraccum.io.columns import Columns, RawVlr, native, readable
+
+PROJECTION_USER = "LASF_Projection"
+WKT_RECORD, WKT_MATH_RECORD = 2112, 2111
+GEOTIFF_RECORDS = (34735, 34736, 34737)
+POSITION = ("X", "Y", "Z")
+
+
+def read_las(path: Path) -> Columns:
+    """Read a LAS or LAZ file whole.
+
+    Raises:
+        InputError: Foreign, damaged or truncated.
+    """
+    check_header(path)
+    with readable(path):
+        try:
+            with laspy.open(path) as reader:
+                points = reader.read_points(-1)
+                header = reader.header
+        except (LaspyException, ValueError, RuntimeError, struct.error) as error:
+            raise unreadable(path, error) from error
+    if len(points) != header.point_count:
+        raise unreadable(path, f"{header.point_count} points promised, {len(points)} found")
+    return columns_of_points(points, header)
+
+
+def columns_of_points(points: Any, header: Any) -> Columns:
+    """Columns of a laspy point record, scaled, every dimension under LAS's name."""
+    xyz = np.empty((len(points), 3))
+    for column, axis in enumerate("xyz"):
+        xyz[:, column] = points[axis]
+    names = [n for n in points.point_format.dimension_names if n not in POSITION]
+    extra = set(points.point_format.extra_dimension_names)
+    attributes: dict[str, NDArray[Any]] = {}
+    for name in names:
+        values = native(np.asarray(points[name]))
+        if values.ndim == 1:
+            attributes[name] = values
+        else:
+            attributes |= {f"{name}_{i}": native(values[:, i]) for i in range(values.shape[1])}
+    vlrs = projection_vlrs(header)
+    standard = frozenset(names) - extra - {"intensity"}
+    return Columns(xyz, attributes, wkt_of(vlrs), vlrs, standard)
+
+
+def check_header(path: Path) -> None:
+    """Raise InputError unless the file's first bytes are a LAS header that fits the file.
+
+    laspy trusts the header: a foreign one sends it reading for minutes.
+    """
+    with readable(path), path.open("rb") as file:
+        head = file.read(375)
+        size = path.stat().st_size
+    if not head.startswith(b"LASF"):
+        raise InputError(f"{path} is not a LAS file: it does not begin with LASF")
+    if len(head) < 227:
+        raise InputError(f"{path} is truncated: {size} bytes, but the header alone has 227")
+    minor = head[25]
+    header_size, points_start, vlr_count = struct.unpack_from("<HII", head, 94)
+    compressed = bool(head[104] & 0x80)
+    record_size, count = struct.unpack_from("<HI", head, 105)
+    if minor >= 4 and len(head) == 375:
+        count = struct.unpack_from("<Q", head, 247)[0]
+    if head[24] != 1 or minor > 4 or header_size < 227 or vlr_count * 54 > points_start:
+        raise InputError(f"{path} is damaged: its LAS header makes no sense")
+    needed = points_start + (0 if compressed else record_size * count)
+    if size < max(needed, header_size):
+        raise InputError(
+            f"{path} is truncated: it promises {count} points, {needed} bytes in all, "
+            f"but has {size}"
+        )
+
+
+def unreadable(path: Path, reason: object) -> InputError:
+    """The error for a body that laspy cannot read through."""
+    size = path.stat().st_size
+    return InputError(f"{path} is truncated or damaged at its {size} bytes: {reason}")
+
+
+def projection_vlrs(header: Any) -> tuple[RawVlr, ...]:
+    """The header's records about the coordinate system, extended ones included."""
+    records = [*header.vlrs, *(header.evlrs or ())]
+    return tuple(
+        RawVlr(r.user_id, r.record_id, r.description, bytes(r.record_data_bytes()))
+        for r in records
+        if r.user_id == PROJECTION_USER
+    )
+
+
+def wkt_of(vlrs: tuple[RawVlr, ...]) -> str | None:
+    """The coordinate system as WKT, where a record says it so."""
+    for vlr in vlrs:
+        if vlr.record_id == WKT_RECORD:
+            text = vlr.data.split(b"\0")[0].decode("utf-8", errors="replace").strip()
+            return text or None
+    return None
+
+
+def read_crs(path: Path) -> tuple[str | None, tuple[RawVlr, ...]]:
+    """Only the coordinate system of a LAS file, its points unread."""
+    check_header(path)
+    with readable(path):
+        try:
+            with laspy.open(path) as reader:
+                vlrs = projection_vlrs(reader.header)
+        except (LaspyException, ValueError, RuntimeError, struct.error) as error:
+            raise unreadable(path, error) from error
+    return wkt_of(vlrs), vlrs

@@ -1,0 +1,417 @@
+"""Open any source of frames as one lazy sequence. Read `open_sequence` first."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidaraccum.data.frame import Box, Frame, Labels
+from lidaraccum.errors import InputError, MissingInputError, SettingsError
+from lidaraccum.io.bin import check_size, default_fields
+from lidaraccum.io.columns import Columns, RawVlr
+from lidaraccum.io.formats import read_columns
+from lidaraccum.io.interpret import Occasion, frame_from_columns
+from lidaraccum.io.layouts import NPZ_LABELS, Layout, Source, find_layout
+from lidaraccum.io.poses import camera_calibration, match_stamps, read_poses, velodyne_poses
+from lidaraccum.io.settings import AUTO_POSES, InputSettings, selection
+from lidaraccum.io.timing import DEFAULT_RATE_HZ, Timing, find_timing
+from lidaraccum.io.truth import label_fields, read_boxes, read_truth, rows_of_labels
+
+__all__ = ["FileSequence", "InputSettings", "ReadCounts", "SequenceInfo", "open_sequence"]
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class SequenceInfo:
+    """What was found, for people and reports.
+
+    Attributes:
+        source: As the user named it.
+        layout: What it was recognised as, in words.
+        format: Of the frames.
+        frames: How many, after ``--frames``.
+        files: The frames' files, in order; one file when it holds many frames.
+        rate_hz: Frames a second.
+        rate_from: Where the rate comes from, in words.
+        times_from: Where the stamps come from, in words.
+        poses_file: Poses found beside the frames, or None.
+        poses_used: Where the poses in use come from, in words.
+        labels: What truth was found, in words; empty for none.
+        crs_wkt: Coordinate reference system, or None.
+        warnings: What looks odd, in words.
+    """
+
+    source: str
+    layout: str
+    format: str
+    frames: int
+    files: tuple[Path, ...]
+    rate_hz: float
+    rate_from: str
+    times_from: str
+    poses_file: Path | None
+    poses_used: str
+    labels: str
+    crs_wkt: str | None
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ReadCounts:
+    """Points of the frames read so far, each frame counted once.
+
+    Attributes:
+        points: In the files.
+        dropped: Not finite, left out.
+        no_return: At the sensor's own place, kept.
+    """
+
+    points: int = 0
+    dropped: int = 0
+    no_return: int = 0
+
+
+class FrameSource(Protocol):
+    """Where the columns of each frame come from."""
+
+    def __len__(self) -> int: ...
+
+    def label(self, index: int) -> str:
+        """What frame ``index`` is called in messages."""
+
+    def columns(self, index: int) -> Columns:
+        """Frame ``index``, read anew."""
+
+
+class FilePerFrame:
+    """One file a frame."""
+
+    def __init__(self, files: tuple[Path, ...], bin_fields: tuple[str, ...]) -> None:
+        self._files = files
+        self._bin_fields = bin_fields
+
+    def __len__(self) -> int:
+        return len(self._files)
+
+    def label(self, index: int) -> str:
+        """The file's name."""
+        return self._files[index].name
+
+    def columns(self, index: int) -> Columns:
+        """The file's content."""
+        return read_columns(self._files[index], self._bin_fields)
+
+
+def open_sequence(source: Source, settings: InputSettings | None = None) -> FileSequence:
+    """Open frames for reading; none is read yet.
+
+    Args:
+        source: A folder, a glob, a list file (``.txt``, ``.lst``), a list of paths, or one file.
+        settings: What the user says about the input.
+
+    Raises:
+        MissingInputError: Nothing is there.
+        InputError: It is there but cannot be read as a sequence.
+    """
+    settings = settings or InputSettings()
+    layout = find_layout(source, settings.format)
+    check_bin_files(layout, settings)
+    return FileSequence(str(source), layout, settings, frame_source(layout, settings))
+
+
+def frame_source(layout: Layout, settings: InputSettings) -> FrameSource:
+    """One file a frame, or one LAS file split."""
+    if settings.split_by is None:
+        return FilePerFrame(layout.frames, settings.bin_fields)
+    if len(layout.frames) != 1 or layout.format not in ("las", "laz"):
+        raise SettingsError(
+            f"--split-by needs one LAS or LAZ file, not {len(layout.frames)} {layout.format} files"
+        )
+    from lidaraccum.io.split import SplitLas
+
+    rate_hz = settings.rate_hz or layout.rate_hz or DEFAULT_RATE_HZ
+    return SplitLas(layout.frames[0], settings.split_by, 1.0 / rate_hz)
+
+
+def check_bin_files(layout: Layout, settings: InputSettings) -> None:
+    """Raise InputError for headerless files whose size no record fits, before any is read."""
+    if layout.format in ("bin", "pcd.bin"):
+        for path in layout.frames:
+            names = settings.bin_fields or default_fields(path)
+            check_size(path, path.stat().st_size, names, given=bool(settings.bin_fields))
+
+
+class FileSequence:
+    """Frames on disk, read when asked for; implements `Sequence` and `LabelledSequence`."""
+
+    def __init__(
+        self, source: str, layout: Layout, settings: InputSettings, frames: FrameSource
+    ) -> None:
+        self._source = source
+        self._layout = layout
+        self._settings = settings
+        self._frames = frames
+        self._chosen = range(len(frames))[selection(settings.frames)]
+        self._counts: dict[int, ReadCounts] = {}
+        self._rows: dict[int, NDArray[np.int64]] = {}
+        self._said: set[str] = set()
+        if not self._chosen:
+            raise InputError(f"--frames {settings.frames} chooses none of {len(frames)} frames")
+
+    def __len__(self) -> int:
+        return len(self._chosen)
+
+    def __getitem__(self, index: int, /) -> Frame:
+        place = self._chosen[index]
+        frame = frame_from_columns(self._columns(place), self._occasion(place, self._period_s))
+        self._count(place, frame)
+        return frame
+
+    @property
+    def name(self) -> str:
+        """The folder's or file's name."""
+        return self._layout.name
+
+    @property
+    def rate_hz(self) -> float:
+        """Frames a second, ``--frames`` counted in."""
+        return 1.0 / (self._period_s * self._chosen.step)
+
+    @cached_property
+    def poses(self) -> NDArray[np.float64] | None:
+        """(T, 4, 4) world_from_sensor, only when the settings ask for poses."""
+        asked = self._settings.poses
+        if not asked:
+            return None
+        if asked != AUTO_POSES:
+            return self._poses_of(Path(asked))
+        if self._layout.poses_file is None:
+            raise MissingInputError(f"no poses lie beside the frames of {self._source}")
+        return self._poses_of(self._layout.poses_file)
+
+    @property
+    def crs_wkt(self) -> str | None:
+        """Coordinate reference system of the first frame as WKT, or None."""
+        return self._crs[0]
+
+    @property
+    def crs_vlrs(self) -> tuple[RawVlr, ...]:
+        """The first LAS file's records about its coordinate system, to be written back."""
+        return self._crs[1]
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The frames' files, in order; one file when it holds many frames."""
+        if len(self._layout.frames) != len(self._frames):
+            return self._layout.frames
+        return tuple(self._layout.frames[place] for place in self._chosen)
+
+    def frame_name(self, index: int) -> str:
+        """What frame ``index`` is called in messages."""
+        return self._frames.label(self._chosen[index])
+
+    @property
+    def counts(self) -> ReadCounts:
+        """Points of the frames read so far."""
+        counts = self._counts.values()
+        return ReadCounts(
+            sum(c.points for c in counts),
+            sum(c.dropped for c in counts),
+            sum(c.no_return for c in counts),
+        )
+
+    def require_frames(self, least: int) -> None:
+        """Raise InputError unless there are that many frames."""
+        if len(self) >= least:
+            return
+        hint = ""
+        if self._layout.format in ("las", "laz") and len(self._frames) == 1:
+            hint = "if the file holds many frames, tell them apart with --split-by"
+        raise InputError(
+            f"{self._source} holds {len(self)} frame, but {least} are needed", hint=hint
+        )
+
+    @property
+    def has_labels(self) -> bool:
+        """Whether the truth about the points lies beside the frames."""
+        return self._layout.labels is not None
+
+    @cached_property
+    def label_fields(self) -> tuple[str, ...]:
+        """Which truth there is: ``instance``, ``dynamic``, ``foreground``, ``semantic``, ..."""
+        folder = self._layout.labels
+        if folder is None:
+            return ()
+        if self._layout.label_kind != NPZ_LABELS:
+            return ("semantic", "instance", "dynamic", "foreground")
+        return label_fields(folder / f"{self._stem(self._chosen[0])}.npz")
+
+    def labels(self, index: int, /) -> Labels:
+        """The truth about frame ``index``, row by row with its points.
+
+        Raises:
+            InputError: There is none, or it has another number of rows than the frame.
+        """
+        folder, place = self._layout.labels, self._chosen[index]
+        if folder is None:
+            raise InputError(f"{self._source} has no labels")
+        pose = self._label_poses[place]
+        boxes = self._boxes.get(place, ())
+        labels = read_truth(folder, self._layout.label_kind, self._stem(place), pose, boxes)
+        if place not in self._counts:
+            self[index]
+        count = self._counts[place].points
+        if len(labels.foreground) != count:
+            raise InputError(
+                f"the labels of {self._frames.label(place)} have {len(labels.foreground)} rows, "
+                f"the frame has {count}"
+            )
+        rows = self._rows.get(place)
+        return labels if rows is None else rows_of_labels(labels, rows)
+
+    @property
+    def info(self) -> SequenceInfo:
+        """What was found, in words."""
+        labels = ", ".join(self.label_fields)
+        return SequenceInfo(
+            source=self._source,
+            layout=self._layout.kind,
+            format=self._layout.format,
+            frames=len(self),
+            files=self.files,
+            rate_hz=self.rate_hz,
+            rate_from=self._timing.rate_from,
+            times_from=self._timing.times_from,
+            poses_file=self._layout.poses_file,
+            poses_used=self._settings.poses or "none: to be estimated",
+            labels=f"{self._layout.label_kind}: {labels}" if labels else "",
+            crs_wkt=self.crs_wkt,
+            warnings=self._layout.warnings,
+        )
+
+    @cached_property
+    def _timing(self) -> Timing:
+        return find_timing(self._layout, self._settings, self._clock_steps)
+
+    @property
+    def _period_s(self) -> float:
+        return self._timing.period_s
+
+    def _clock_steps(self) -> float | None:
+        """Seconds between the first two frames by the points' own clock, or None."""
+        if self._layout.format in ("bin", "pcd.bin") and not self._settings.bin_fields:
+            return None
+        period_s = 1.0 / (self._layout.rate_hz or DEFAULT_RATE_HZ)
+        stamps = []
+        for place in range(min(2, len(self._frames))):
+            columns = self._frames.columns(place)
+            occasion = Occasion(self._frames.label(place), -1e12, period_s)
+            stamp = frame_from_columns(columns, occasion).stamp
+            if stamp == occasion.stamp:
+                return None
+            stamps.append(stamp)
+        return stamps[1] - stamps[0] if len(stamps) == 2 else None
+
+    def _occasion(self, place: int, period_s: float) -> Occasion:
+        stamps = self._timing.stamps
+        name = self._frames.label(place)
+        if stamps is None:
+            return Occasion(name, place * period_s, period_s)
+        return Occasion(name, float(stamps[place]), period_s, exact=True)
+
+    def _columns(self, place: int) -> Columns:
+        columns = self._frames.columns(place)
+        for said in columns.warnings:
+            self._say_once(said.partition(": ")[2] or said, said)
+        if not columns.standard:
+            return columns
+        used = {
+            name: values
+            for name, values in columns.attributes.items()
+            if name not in columns.standard or name in self._used_standard or values.any()
+        }
+        return replace(columns, attributes=used)
+
+    @cached_property
+    def _used_standard(self) -> frozenset[str]:
+        """Dimensions every LAS file has that this one uses, judged by the first and last frame."""
+        used: set[str] = set()
+        for place in {self._chosen[0], self._chosen[-1]}:
+            columns = self._frames.columns(place)
+            used |= {n for n in columns.standard if columns.attributes[n].any()}
+        return frozenset(used)
+
+    def _count(self, place: int, frame: Frame) -> None:
+        dropped = frame.row_count - len(frame)
+        missing = int(len(frame) - np.count_nonzero(frame.returned))
+        self._counts[place] = ReadCounts(frame.row_count, dropped, missing)
+        if frame.rows is not None:
+            self._rows[place] = frame.rows
+        if dropped:
+            self._say_once("dropped", f"{frame.name}: {dropped} non-finite points dropped")
+        if missing:
+            self._say_once("missing", f"{frame.name}: {missing} points without return at 0, 0, 0")
+
+    def _say_once(self, key: str, sentence: str) -> None:
+        if key not in self._said:
+            self._said.add(key)
+            logger.warning("%s (said once a sequence)", sentence)
+
+    def _stem(self, place: int) -> str:
+        name = self._layout.frames[place].name
+        return name[: -len(self._layout.format) - 1]
+
+    @cached_property
+    def _crs(self) -> tuple[str | None, tuple[RawVlr, ...]]:
+        if self._layout.format not in ("las", "laz"):
+            return None, ()
+        from lidaraccum.io.las import read_crs
+
+        return read_crs(self._layout.frames[0])
+
+    @cached_property
+    def _boxes(self) -> dict[int, tuple[Box, ...]]:
+        return read_boxes(self._layout.boxes_file) if self._layout.boxes_file else {}
+
+    @cached_property
+    def _label_poses(self) -> NDArray[np.float64]:
+        """Poses (T, 4, 4) of all frames on disk, for the labels: where none are, the identity."""
+        count = len(self._frames)
+        if self._layout.poses_file is None:
+            return np.tile(np.eye(4), (count, 1, 1))
+        poses = self._sensor_poses(self._layout.poses_file)
+        if len(poses) != count:
+            raise InputError(
+                f"{self._layout.poses_file} holds {len(poses)} poses for {count} frames"
+            )
+        return poses
+
+    def _sensor_poses(self, path: Path) -> NDArray[np.float64]:
+        """Poses (T, 4, 4) of a file; KITTI's own are the camera's and are moved to the sensor."""
+        trajectory = read_poses(path)
+        stamps = self._timing.stamps
+        if trajectory.stamps is not None and len(trajectory) != len(self._frames):
+            if stamps is None:
+                stamps = self._period_s * np.arange(len(self._frames), dtype=np.float64)
+            return match_stamps(trajectory, stamps, self._period_s / 2, path)
+        poses, found = trajectory.world_from_sensor, self._layout.poses_file
+        is_own = found is not None and found.resolve() == path.resolve()
+        if is_own and self._layout.calibration is not None:
+            return velodyne_poses(poses, camera_calibration(self._layout.calibration))
+        return poses
+
+    def _poses_of(self, path: Path) -> NDArray[np.float64]:
+        """Poses (T, 4, 4) of the chosen frames."""
+        poses = self._sensor_poses(path)
+        if len(poses) == len(self._frames):
+            return poses[list(self._chosen)]
+        if len(poses) == len(self):
+            return poses
+        raise InputError(f"{path} holds {len(poses)} poses for {len(self._frames)} frames")
