@@ -1,0 +1,39 @@
+"""How much time passes between frames, from stamps that may be rounded, constant or missing."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+DEFAULT_INTERVAL_S = 0.1
+ROUNDING = 0.12
+"""Intervals this near to the usual one are taken as it: KITTI rounds its stamps to 10 ms."""
+
+MAX_STEPS = 20.0
+
+
+class Pace:
+    """The usual interval between frames, and how many of it lie between two."""
+
+    def __init__(self) -> None:
+        self._intervals: deque[float] = deque(maxlen=9)
+
+    def see(self, earlier_s: float, later_s: float) -> None:
+        """Note one interval; stamps that do not advance say nothing."""
+        if later_s > earlier_s:
+            self._intervals.append(later_s - earlier_s)
+
+    @property
+    def interval_s(self) -> float:
+        """The usual interval, seconds."""
+        return float(np.median(self._intervals)) if self._intervals else DEFAULT_INTERVAL_S
+
+    def steps(self, earlier_s: float, later_s: float) -> float:
+        """How many usual intervals lie between two stamps; 1 where the stamps cannot tell."""
+        if later_s <= earlier_s:
+            return 1.0
+        steps = (later_s - earlier_s) / self.interval_s
+        if abs(steps - round(steps)) <= ROUNDING * max(round(steps), 1) and round(steps) >= 1:
+            steps = float(round(steps))
+        return float(min(steps, MAX_STEPS))
