@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -66,7 +65,7 @@ class Frame:
         for name, values in columns.items():
             if values is not None and values.shape != (len(points),):
                 raise InputError(f"{name} must be ({len(points)},), not {values.shape}")
-        object.__setattr__(self, "attributes", MappingProxyType(dict(self.attributes)))
+        object.__setattr__(self, "attributes", dict(self.attributes))
         object.__setattr__(self, "origin", np.asarray(self.origin, dtype=np.float64))
         if self.row_count < 0:
             object.__setattr__(self, "row_count", len(points))
