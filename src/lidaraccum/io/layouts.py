@@ -44,6 +44,7 @@ class Layout:
         calibration: KITTI's calib.txt when those poses are the camera's, or None.
         labels: Folder with the truth about the points, or None.
         label_kind: `NPZ_LABELS` or `SEMANTIC_KITTI_LABELS`, or empty.
+        bin_fields: Names of the fields of ``.bin`` frames that the folder states, or none.
         boxes_file: Tracked boxes, or None.
         warnings: What looks odd, in words.
     """
@@ -59,6 +60,7 @@ class Layout:
     calibration: Path | None = None
     labels: Path | None = None
     label_kind: str = ""
+    bin_fields: tuple[str, ...] = ()
     boxes_file: Path | None = None
     warnings: tuple[str, ...] = ()
 
@@ -151,6 +153,7 @@ def labelled_layout(folder: Path) -> Layout:
         poses_file=first_file(folder, "poses.txt", "poses.tum"),
         labels=labels if has_labels else None,
         label_kind=NPZ_LABELS if has_labels else "",
+        bin_fields=tuple(str(name) for name in meta.get("bin_fields", ())),
         boxes_file=first_file(folder, "boxes.json"),
     )
 

@@ -122,6 +122,8 @@ def open_sequence(source: Source, settings: InputSettings | None = None) -> File
     """
     settings = settings or InputSettings()
     layout = find_layout(source, settings.format)
+    if layout.bin_fields and not settings.bin_fields:
+        settings = replace(settings, bin_fields=layout.bin_fields)
     check_bin_files(layout, settings)
     return FileSequence(str(source), layout, settings, frame_source(layout, settings))
 
