@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -141,9 +142,10 @@ def _poisson(
     surface, density = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(
         cloud, depth=settings.depth
     )
-    density = np.asarray(density)
-    if len(density):
-        surface.remove_vertices_by_mask(density < np.percentile(density, settings.trim_percentile))
+    densities = np.asarray(density)
+    if len(densities):
+        thin = densities < np.percentile(densities, settings.trim_percentile)
+        surface.remove_vertices_by_mask(thin)
     surface.compute_vertex_normals()
     return _as_mesh(surface)
 
@@ -179,7 +181,7 @@ def _joined(pieces: list[Mesh]) -> Mesh:
     )
 
 
-def write_mesh(path: str, mesh: Mesh) -> None:
+def write_mesh(path: Path, mesh: Mesh) -> None:
     """Write a mesh as PLY, OBJ, STL, OFF or glTF, whichever the suffix says."""
     import open3d as o3d
 

@@ -1,0 +1,175 @@
+"""Options that several commands share, each defined once.
+
+A setting comes from its flag, then ``LIDARACCUM_NAME`` in the environment, then the TOML file
+given with ``--config``, then its default.
+"""
+
+from __future__ import annotations
+
+import difflib
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+Function = Callable[..., Any]
+Decorator = Callable[[Function], Function]
+
+
+class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """Numbers parted by commas; a list in the TOML file."""
+
+    name = "numbers"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, ...]:
+        """Any of ``1,2,3``, ``[1, 2, 3]`` or an empty text as a tuple of floats."""
+        parts = value.split(",") if isinstance(value, str) else value
+        try:
+            return tuple(float(part) for part in parts if str(part).strip())
+        except (TypeError, ValueError):
+            self.fail(f"{value!r} is not a list of numbers like 1,2,3", param, ctx)
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    if sys.version_info >= (3, 11):
+        import tomllib
+    else:
+        import tomli as tomllib
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise click.BadParameter(f"{path} is not TOML: {error}") from error
+
+
+def _load_config(ctx: click.Context, param: click.Parameter, path: Path | None) -> Path | None:
+    """Take settings from a TOML file; keys are the long options' names."""
+    if path is None:
+        return None
+    known = {
+        flag[2:]: option.name
+        for option in ctx.command.params
+        for flag in option.opts
+        if isinstance(option, click.Option) and flag.startswith("--") and option.name != param.name
+    }
+    values = {}
+    for key, value in _read_toml(path).items():
+        name = known.get(key.replace("_", "-"))
+        if name is None:
+            near = difflib.get_close_matches(key.replace("_", "-"), known, n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise click.BadParameter(f"{path} sets {key!r}, which no option has{hint}")
+        values[name] = value
+    ctx.default_map = {**(ctx.default_map or {}), **values}
+    return path
+
+
+def _stack(*decorators: Decorator) -> Decorator:
+    def decorate(function: Function) -> Function:
+        for wrap in reversed(decorators):
+            function = wrap(function)
+        return function
+
+    return decorate
+
+
+sequence_argument = click.argument("sequence", nargs=-1, required=True, metavar="SEQ...")
+
+input_options = _stack(
+    click.option(
+        "--frames", metavar="A:B:C", help="Only these frames, as a slice: start:stop:step."
+    ),
+    click.option("--rate", type=float, metavar="HZ", help="Frames a second, where no stamps say."),
+    click.option("--format", "format_", metavar="SUFFIX", help="In a mixed folder: which files."),
+    click.option(
+        "--bin-fields",
+        metavar="NAMES",
+        help="Fields of .bin files: x,y,z,intensity,...",
+    ),
+    click.option(
+        "--split-by",
+        metavar="FIELD",
+        help="Split one LAS file into frames: point_source_id, gps_time or any field.",
+    ),
+    click.option(
+        "--poses",
+        metavar="FILE",
+        help="Poses to use, KITTI or TUM; 'auto' for those found.",
+    ),
+)
+
+registration_options = _stack(
+    click.option(
+        "--poses-mode",
+        type=click.Choice(["given", "refine"]),
+        default="given",
+        help="Take given poses as they are, or as a start.",
+    ),
+    click.option(
+        "--deskew",
+        type=click.Choice(["auto", "off"]),
+        default="auto",
+        help="Undo the sensor's motion within each frame where the frames need it.",
+    ),
+)
+
+result_options = _stack(
+    click.option(
+        "--method",
+        type=click.Choice(["ego-only", "oracle"]),
+        default="ego-only",
+        help="What finds movers: nothing, or the labels that came with the sequence.",
+    ),
+    click.option(
+        "--reference",
+        default="first",
+        metavar="FRAME",
+        help="Whose coordinates: first, middle, last, an index, or world with given poses.",
+    ),
+    click.option(
+        "--voxel", type=float, default=0.0, metavar="M", help="Keep one point a voxel; 0 all."
+    ),
+    click.option(
+        "--crop",
+        type=Numbers(),
+        metavar="X0,Y0,X1,Y1",
+        help="Keep only this box of the cloud; six numbers give z as well.",
+    ),
+    click.option("--min-range", type=float, default=0.0, metavar="M", help="Drop nearer points."),
+    click.option(
+        "--max-range", type=float, default=0.0, metavar="M", help="Drop farther points; 0 for none."
+    ),
+    click.option(
+        "--drop-dynamic", "--static-only", is_flag=True, help="The clean map: drop what moves."
+    ),
+)
+
+output_options = _stack(
+    click.option("--overwrite", is_flag=True, help="Replace outputs that exist."),
+    click.option("--dry-run", is_flag=True, help="Say what would be read and written, do nothing."),
+)
+
+talk_options = _stack(
+    click.option(
+        "--config",
+        type=click.Path(exists=True, dir_okay=False, path_type=Path),
+        is_eager=True,
+        callback=_load_config,
+        help="Settings from a TOML file, keys named like the options.",
+    ),
+    click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON."),
+    click.option("--no-progress", is_flag=True, help="No progress bar; none without a terminal."),
+    click.option("-q", "--quiet", is_flag=True, help="Say only what went wrong."),
+    click.option("-v", "--verbose", is_flag=True, help="Say what is being done."),
+    click.option("--traceback", is_flag=True, help="Show where an error came from."),
+)
+
+
+def chosen_source(sequence: Sequence[str]) -> str | list[str]:
+    """What the SEQ arguments mean: one source, many files, or ``-`` for a list on stdin."""
+    if list(sequence) == ["-"]:
+        return [line.strip() for line in sys.stdin if line.strip()]
+    return sequence[0] if len(sequence) == 1 else list(sequence)

@@ -1,0 +1,67 @@
+"""From parsed options to the settings that the library's own functions take."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from lidaraccum.io.sequences import FileSequence
+    from lidaraccum.pipeline.accumulator import AccumulateSettings
+
+# Options that decide neither what is read nor what comes out.
+TALK = {"config", "as_json", "no_progress", "quiet", "verbose", "traceback", "dry_run", "overwrite"}
+
+
+def open_source(params: Mapping[str, Any]) -> FileSequence:
+    """The sequence that the SEQ arguments and the input options name."""
+    from lidaraccum.cli.options import chosen_source
+    from lidaraccum.io.sequences import open_sequence
+    from lidaraccum.io.settings import InputSettings
+
+    settings = InputSettings(
+        rate_hz=params["rate"],
+        bin_fields=tuple(
+            name.strip() for name in (params["bin_fields"] or "").split(",") if name.strip()
+        ),
+        split_by=params["split_by"],
+        poses=params["poses"] or "",
+        frames=params["frames"] or "",
+        format=params["format_"],
+    )
+    return open_sequence(chosen_source(params["sequence"]), settings)
+
+
+def accumulate_settings(params: Mapping[str, Any]) -> AccumulateSettings:
+    """What decides how the cloud looks."""
+    from lidaraccum.pipeline.accumulator import AccumulateSettings
+    from lidaraccum.pipeline.selection import SelectionSettings
+    from lidaraccum.registration.settings import RegistrationSettings
+
+    return AccumulateSettings(
+        method=params["method"],
+        reference=params["reference"],
+        registration=RegistrationSettings(deskew=params["deskew"], poses_mode=params["poses_mode"]),
+        selection=SelectionSettings(
+            voxel_m=params["voxel"],
+            crop_m=params["crop"] or (),
+            min_range_m=params["min_range"],
+            max_range_m=params["max_range"],
+            drop_dynamic=params["drop_dynamic"],
+        ),
+    )
+
+
+def reported(params: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings for a report: plain values by option name, without those of mere talk."""
+    return {
+        name.rstrip("_").replace("_", "-"): _plain(value)
+        for name, value in params.items()
+        if name not in TALK
+    }
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_plain(part) for part in value]
+    return value if isinstance(value, (bool, int, float, str, type(None))) else str(value)
