@@ -18,6 +18,7 @@ from lidaraccum.geometry import rigid
 from lidaraccum.pipeline.clock import StageClock
 from lidaraccum.pipeline.perception import AllStatic, GivenLabels, Perceiver
 from lidaraccum.pipeline.placing import Reference
+from lidaraccum.pipeline.read_ahead import read_ahead
 from lidaraccum.pipeline.report import FrameTally
 from lidaraccum.pipeline.selection import Selection, SelectionSettings
 from lidaraccum.pipeline.spool import after_the_last
@@ -110,8 +111,7 @@ class Accumulator:
         return self._book.tracks(self._found_reference().reference_from_world)
 
     def _read(self) -> Iterator[Frame]:
-        for index in range(len(self._sequence)):
-            frame = self._sequence[index]
+        for frame in read_ahead(self._sequence):
             self.tally.count_frame(frame)
             yield frame
 

@@ -56,11 +56,12 @@ class TrackBook:
             motions: reference_from_frame (4, 4) of each mover, for the file's coordinates.
             axes: reference_from_object (4, 4) of each mover, to measure its size along.
         """
-        order = np.argsort(frame.instance, kind="stable")
-        ids, starts = np.unique(frame.instance[order], return_index=True)
-        for instance, rows in zip(ids.tolist(), np.split(order, starts[1:]), strict=True):
-            if instance == 0:
-                continue
+        owned = np.flatnonzero(frame.instance)
+        if not len(owned):
+            return
+        owned = owned[np.argsort(frame.instance[owned], kind="stable")]
+        ids, starts = np.unique(frame.instance[owned], return_index=True)
+        for instance, rows in zip(ids.tolist(), np.split(owned, starts[1:]), strict=True):
             entry = self._entries.setdefault(instance, _Entry())
             entry.reference_from_frame[frame.index] = motions.get(
                 instance, frame.reference_from_sensor
