@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -24,9 +27,9 @@ def read_npy(path: Path) -> Columns:
     Raises:
         InputError: Foreign, truncated, or of another shape.
     """
-    array = load(path)
-    if not isinstance(array, np.ndarray):
-        raise InputError(f"{path} is an archive of arrays: call it .npz")
+    with loaded(path) as array:
+        if not isinstance(array, np.ndarray):
+            raise InputError(f"{path} is an archive of arrays: call it .npz")
     if array.dtype.names:
         return columns_of_record(path, array.reshape(-1))
     return columns_of_array(path, array)
@@ -38,14 +41,7 @@ def read_npz(path: Path) -> Columns:
     Raises:
         InputError: Foreign, truncated, or without points.
     """
-    archive = load(path)
-    if isinstance(archive, np.ndarray):
-        raise InputError(f"{path} is one array, not an archive: call it .npy")
-    with archive, readable(path):
-        try:
-            arrays = {name: archive[name] for name in archive.files}
-        except (ValueError, BadZipFile, EOFError, KeyError) as error:
-            raise InputError(f"{path} is truncated or damaged: {error}") from error
+    arrays = arrays_of_npz(path)
     key = next((name for name in POINT_KEYS if name in arrays), None)
     if key is None:
         return columns_of_names(path, arrays)
@@ -59,12 +55,27 @@ def read_npz(path: Path) -> Columns:
     return Columns(points.xyz, {**points.attributes, **others}, warnings=said)
 
 
-def load(path: Path) -> Any:
+def arrays_of_npz(path: Path) -> dict[str, NDArray[Any]]:
+    """Every array of an archive by its name.
+
+    Raises:
+        InputError: Foreign or truncated.
+    """
+    with loaded(path) as archive:
+        if isinstance(archive, np.ndarray):
+            raise InputError(f"{path} is one array, not an archive: call it .npy")
+        return {name: archive[name] for name in archive.files}
+
+
+@contextmanager
+def loaded(path: Path) -> Iterator[Any]:
     """What numpy finds in the file; pickled objects are refused."""
-    with readable(path):
+    with readable(path), path.open("rb") as file:
         try:
-            return np.load(path, allow_pickle=False)
-        except (ValueError, BadZipFile, EOFError) as error:
+            yield np.load(file, allow_pickle=False)
+        except InputError:
+            raise
+        except (ValueError, BadZipFile, EOFError, KeyError, zlib.error) as error:
             size = path.stat().st_size
             raise InputError(f"{path} ({size} bytes) is no whole NumPy file: {error}") from error
 

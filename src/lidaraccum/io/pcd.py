@@ -111,9 +111,12 @@ def read_ascii(path: Path, content: bytes, header: PcdHeader) -> NDArray[Any]:
     """The first POINTS lines as a structured array (N,)."""
     if not header.points:
         return np.zeros(0, header.dtype)
-    body = io.BytesIO(content[header.start :])
+    lines = content[header.start :].split(b"\n", header.points)[: header.points]
+    if not b"".join(lines).strip():
+        raise InputError(f"{path} is truncated: it promises {header.points} points, but has none")
+    body = io.BytesIO(b"\n".join(lines))
     try:
-        rows = np.loadtxt(body, dtype=np.float64, max_rows=header.points, ndmin=2)
+        rows = np.loadtxt(body, dtype=np.float64, ndmin=2)
     except ValueError as error:
         raise InputError(f"{path} is damaged: {error}") from error
     width = sum(int(np.prod(header.dtype[name].shape, dtype=int)) for name in names_of(header))

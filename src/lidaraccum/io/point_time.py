@@ -1,7 +1,7 @@
 """When each point was measured: finding the column, its unit, and what it counts from.
 
 The rule, for every column called like a time: its unit is the one of s, ms, us, ns by which the
-points of the frame span between 2 ms and one and a half frame periods (at least 0.15 s); at most
+points of the frame span between 10 ms and one and a half frame periods (at least 0.15 s); at most
 one does. A column for which none does, a constant one among them, is no time. Seconds
 within one and a half periods of zero count from the frame's stamp; seconds that near to the stamp
 count from where the stamp does; otherwise the points have a clock of their own: it gives the stamp
@@ -32,7 +32,7 @@ TIME_NAMES = (
     "input_time",
 )
 UNITS_S = (1.0, 1e-3, 1e-6, 1e-9)
-SHORTEST_SPAN_S = 2e-3
+SHORTEST_SPAN_S = 1e-2
 SHORTEST_PERIOD_S = 0.1
 ROTATIONS = 1.5
 """How much of a rotation one frame may span."""

@@ -6,7 +6,6 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from lidaraccum.errors import InputError
 from lidaraccum.geometry import rigid
 from lidaraccum.io.columns import readable
 from lidaraccum.io.layouts import SEMANTIC_KITTI_LABELS
+from lidaraccum.io.npy import arrays_of_npz
 
 MOVING_CLASSES = range(251, 260)
 """SemanticKITTI's moving classes; 251 is the motion benchmark's "moving"."""
@@ -57,12 +57,7 @@ def semantic_kitti(path: Path, world_from_sensor: rigid.Pose) -> Labels:
 
 def labels_of_npz(path: Path, world_from_sensor: rigid.Pose, boxes: tuple[Box, ...]) -> Labels:
     """Arrays (N,) of the labelled layout; those that are missing say "none of it"."""
-    with readable(path):
-        try:
-            with np.load(path, allow_pickle=False) as archive:
-                arrays = {name: archive[name] for name in archive.files}
-        except (ValueError, BadZipFile, EOFError) as error:
-            raise InputError(f"{path} is truncated or damaged: {error}") from error
+    arrays = arrays_of_npz(path)
     if not arrays:
         raise InputError(f"{path} holds no label")
     count = len(next(iter(arrays.values())))
@@ -83,12 +78,7 @@ def labels_of_npz(path: Path, world_from_sensor: rigid.Pose, boxes: tuple[Box, .
 
 def label_fields(path: Path) -> tuple[str, ...]:
     """Names of the arrays in one file of labels."""
-    with readable(path):
-        try:
-            with np.load(path, allow_pickle=False) as archive:
-                return tuple(archive.files)
-        except (ValueError, BadZipFile, EOFError) as error:
-            raise InputError(f"{path} is truncated or damaged: {error}") from error
+    return tuple(arrays_of_npz(path))
 
 
 def rows_of_labels(labels: Labels, rows: NDArray[np.int64]) -> Labels:
