@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from lidaraccum.simulation.mesh import Mesh
 from lidaraccum.simulation.models import Model
 from lidaraccum.simulation.motion import Trajectory
-from lidaraccum.simulation.roads import Network, Path
-from lidaraccum.simulation.terrain import Terrain, attitude, corners_of, standing_height
+from lidaraccum.simulation.roads import Path
+from lidaraccum.simulation.terrain import Terrain, attitude, corners_of
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ class Way:
     backwards: bool = False
 
 
-def follow(way: Way, model: Model, times: Array, network: Network, terrain: Terrain) -> Trajectory:
+def follow(way: Way, model: Model, times: Array, terrain: Terrain) -> Trajectory:
     """The trajectory (K samples) of a model on its way over the ground."""
     places, yaw = way.path.at(way.along, way.lateral)
     drift = np.gradient(way.lateral, times)
@@ -65,7 +65,7 @@ def follow(way: Way, model: Model, times: Array, network: Network, terrain: Terr
     upright = len(model.phases) > 1 or length < 1.2
     size = (0.6 * length, 0.8 * width)
     if upright:
-        z = standing_height(terrain, network, places)
+        z = terrain.standing_height(places)
         pitch = roll = np.zeros(len(times))
     else:
         corners = corners_of(places, yaw, size).reshape(-1, 2)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lidaraccum.data.frame import Box, Frame, Labels
 from lidaraccum.errors import SettingsError
-from lidaraccum.geometry.rigid import invert, translation
+from lidaraccum.geometry.rigid import invert
 from lidaraccum.simulation.actors import Actor
 from lidaraccum.simulation.ego import Ego, draw_body, draw_mount, drive_ego
 from lidaraccum.simulation.motion import MANOEUVRES, sample_times, speed_profile
@@ -113,18 +113,21 @@ class DrawnDrive:
 def draw_drive(settings: DriveSettings) -> DrawnDrive:
     """Fill in what the settings leave open. What is drawn does not depend on what is given."""
     rng = np.random.default_rng([settings.seed, 1])
-    names = list(SENSORS)
-    sensor = sensor_by_name(settings.sensor or _pick(rng, [*names, *[RANDOM_SENSOR] * 4]), _child(rng))
-    rate = settings.rate_hz or float(_child(rng).choice(sensor.rates_hz))
-    speed = _draw_speed(_child(rng)) if settings.speed_mps is None else settings.speed_mps
-    scene = settings.scene or draw_kind(speed, _child(rng))
-    manoeuvre = settings.manoeuvre or _draw_manoeuvre(speed, _child(rng))
-    rolling = _either(settings.rolling_shutter, rng.random() < 0.85)
-    compensated = _either(settings.compensated, rng.random() < 0.5) and rolling
-    vehicle = (settings.coordinates or ("vehicle" if rng.random() < 0.2 else "sensor")) == "vehicle"
-    zeros = _either(settings.zeros, rng.random() < 0.12)
-    weather = settings.weather or _pick(rng, ["clear"] * 16 + ["rain", "rain", "fog", "snow"])
-    realism = _draw_realism(weather, _child(rng))
+    children = [_child(rng) for _ in range(6)]
+    chance = rng.random(8)
+    sensor_name = settings.sensor or _pick(chance[0], [*SENSORS, *[RANDOM_SENSOR] * 4])
+    sensor = sensor_by_name(sensor_name, children[0])
+    rate = settings.rate_hz or float(children[1].choice(sensor.rates_hz))
+    drawn_speed = _draw_speed(children[2])
+    speed = drawn_speed if settings.speed_mps is None else settings.speed_mps
+    scene = settings.scene or draw_kind(speed, children[3])
+    manoeuvre = settings.manoeuvre or _draw_manoeuvre(speed, children[4])
+    rolling = _either(settings.rolling_shutter, chance[1] < 0.85)
+    compensated = _either(settings.compensated, chance[2] < 0.5) and rolling
+    vehicle = (settings.coordinates or ("vehicle" if chance[3] < 0.2 else "sensor")) == "vehicle"
+    zeros = _either(settings.zeros, chance[4] < 0.12)
+    weather = settings.weather or _pick(chance[5], ["clear"] * 16 + ["rain", "rain", "fog", "snow"])
+    realism = _draw_realism(weather, children[5])
     return DrawnDrive(
         sensor, rate, scene, speed, manoeuvre, rolling, compensated, vehicle,
         zeros, IDEAL if settings.exact else realism,
@@ -135,8 +138,8 @@ def _child(rng: np.random.Generator) -> np.random.Generator:
     return np.random.default_rng(rng.integers(2**63))
 
 
-def _pick(rng: np.random.Generator, names: list[str]) -> str:
-    return names[int(rng.integers(len(names)))]
+def _pick(chance: float, names: list[str]) -> str:
+    return names[int(chance * len(names))]
 
 
 def _either(given: bool | None, drawn: bool) -> bool:
@@ -295,9 +298,10 @@ class SimulatedSequence:
         back = np.isfinite(distance)
         kept = np.arange(len(distance)) if self.drawn.zeros else np.flatnonzero(back)
         column, ring = kept // beams, kept % beams
-        points = np.zeros((len(kept), 3), dtype=np.float32)
         came = back[kept]
-        points[came] = self._places(index, rays, column[came], ring[came], distance[kept[came]])
+        places = self._places(index, rays, np.where(back, distance, 0).reshape(columns, beams))
+        points = places.reshape(-1, 3)[kept]
+        points[~came] = 0.0
         frame = Frame(
             points=points,
             stamp=self.stamp(index),
@@ -310,19 +314,20 @@ class SimulatedSequence:
         return frame, self._label(index, met, kept, solid, echoes)
 
     def _places(
-        self, index: int, rays: Rays, column: NDArray[np.int64], ring: NDArray[np.int64],
-        distance: NDArray[np.float32],
-    ) -> NDArray[np.float32]:  # fmt: skip
-        points = rays.local[column, ring] * distance[:, None]
-        points[:, 2] += self.drawn.sensor.height[ring].astype(np.float32)
+        self, index: int, rays: Rays, distance: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """(C, B, 3) float32 metres in the frame's coordinates, from distances (C, B)."""
+        points = rays.local * distance[..., None]
+        points[..., 2] += self.drawn.sensor.height.astype(np.float32)
+        frame_from_sensor = np.eye(4)[None]
         mount = self.ego.vehicle_from_sensor
         if self.drawn.compensated:
             stamp_pose = self.ego.trajectory.poses_at(np.array([self.stamp(index)]))[0] @ mount
-            motion = (invert(stamp_pose) @ rays.world_from_sensor).astype(np.float32)[column]
-            points = np.einsum("nij,nj->ni", motion[:, :3, :3], points) + motion[:, :3, 3]
+            frame_from_sensor = invert(stamp_pose) @ rays.world_from_sensor
         if self.drawn.vehicle_coordinates:
-            points = points @ mount[:3, :3].T.astype(np.float32) + mount[:3, 3].astype(np.float32)
-        return points.astype(np.float32)
+            frame_from_sensor = mount @ frame_from_sensor
+        rotation = np.swapaxes(frame_from_sensor[:, :3, :3], 1, 2).astype(np.float32)
+        return points @ rotation + frame_from_sensor[:, None, :3, 3].astype(np.float32)
 
     def _label(
         self, index: int, met: Encounter, kept: NDArray[np.int64], solid: NDArray[np.bool_],
@@ -348,22 +353,25 @@ class SimulatedSequence:
 
     def _boxes(self, stamp: float, world_from_sensor: Array) -> tuple[Box, ...]:
         """Boxes of all objects the sensor could reach from where it is."""
-        sensor_from_world = invert(world_from_sensor)
-        standing = [(s.id, s.model, s.world_from_object, 0.0) for s in self.world.stills]
-        driving = [
-            (a.id, a.model, a.trajectory.poses_at(np.array([stamp]))[0], a.trajectory.speed_at(stamp))
-            for a in self.actors
-        ]
-        boxes = []
-        for number, model, pose, speed in [*standing, *driving]:
-            raised = pose @ translation((0.0, 0.0, 0.5 * model.size_lwh[2]))
-            sensor_from_object = sensor_from_world @ raised
-            if np.linalg.norm(sensor_from_object[:3, 3]) > self.drawn.sensor.max_range_m + 20.0:
-                continue
-            boxes.append(
-                Box(number, model.category, model.size_lwh, sensor_from_object, speed, speed > DYNAMIC_MPS)
+        driving = [actor.trajectory.poses_at(np.array([stamp]))[0] for actor in self.actors]
+        speeds = [0.0] * len(self.world.stills)
+        speeds += [actor.trajectory.speed_at(stamp) for actor in self.actors]
+        movables = [*self.world.stills, *self.actors]
+        if not movables:
+            return ()
+        poses = np.stack([*(still.world_from_object for still in self.world.stills), *driving])
+        half = 0.5 * np.array([movable.model.size_lwh[2] for movable in movables])
+        poses[:, :3, 3] += half[:, None] * poses[:, :3, 2]
+        seen_from = invert(world_from_sensor) @ poses
+        reach = np.linalg.norm(seen_from[:, :3, 3], axis=1)
+        near = np.flatnonzero(reach < self.drawn.sensor.max_range_m + 20.0)
+        return tuple(
+            Box(
+                movables[row].id, movables[row].model.category, movables[row].model.size_lwh,
+                seen_from[row], speeds[row], speeds[row] > DYNAMIC_MPS,
             )
-        return tuple(boxes)
+            for row in near
+        )  # fmt: skip
 
 
 def _before_own_car(met: Encounter, own: NDArray[np.float32]) -> Encounter:

@@ -185,17 +185,23 @@ def lathe(profile: Sequence[tuple[float, float]], finish: Finish, segments: int 
     return grid(vertices, finish, closed=True)
 
 
+_HEXAGON = np.stack([np.cos(np.pi / 3 * np.arange(6)), np.sin(np.pi / 3 * np.arange(6))], axis=1)
+_ROD_TRIANGLES = np.array(
+    [[k, (k + 1) % 6, (k + 1) % 6 + 6] for k in range(6)] + [[k, (k + 1) % 6 + 6, k + 6] for k in range(6)]
+)
+
+
 def rod(start: Array | Triple, end: Array | Triple, radius: float, finish: Finish) -> Mesh:
     """A six-sided rod between two points, metres, without caps."""
-    first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
-    axis = last - first
-    helper = np.array([0.0, 0, 1]) if abs(axis[2]) < 0.9 * np.linalg.norm(axis) else np.eye(3)[0]
-    side = np.cross(axis, helper)
-    side /= max(float(np.linalg.norm(side)), 1e-9)
-    up = np.cross(side, axis) / max(float(np.linalg.norm(axis)), 1e-9)
-    angle = np.pi / 3 * np.arange(6)
-    ring = radius * (np.cos(angle)[:, None] * side + np.sin(angle)[:, None] * up)
-    return grid(np.stack([first + ring, last + ring]), finish, closed=True)
+    (ax, ay, az), (bx, by, bz) = start, end
+    x, y, z = float(bx - ax), float(by - ay), float(bz - az)
+    length = max((x * x + y * y + z * z) ** 0.5, 1e-9)
+    flat = (x * x + y * y) ** 0.5
+    side = np.array([y / flat, -x / flat, 0.0]) if flat > 1e-3 * length else np.array([1.0, 0, 0])
+    up = np.array([side[1] * z, -side[0] * z, side[0] * y - side[1] * x]) / length
+    ring = radius * (_HEXAGON[:, :1] * side + _HEXAGON[:, 1:] * up)
+    vertices = np.concatenate([ring + np.array([ax, ay, az]), ring + np.array([bx, by, bz])])
+    return of_triangles(vertices, _ROD_TRIANGLES, finish)
 
 
 def disc_wheel(centre: Triple, radius: float, width: float, finish: Finish) -> Mesh:

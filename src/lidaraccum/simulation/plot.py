@@ -12,7 +12,7 @@ from lidaraccum.simulation.mesh import Mesh
 from lidaraccum.simulation.models import Model
 from lidaraccum.simulation.motion import poses_of
 from lidaraccum.simulation.roads import Network
-from lidaraccum.simulation.terrain import Terrain, attitude, corners_of, standing_height
+from lidaraccum.simulation.terrain import Terrain, attitude, corners_of
 
 Array = NDArray[np.float64]
 
@@ -73,11 +73,11 @@ class Plot:
 
     def off_road(self, places: Array, margin: float) -> NDArray[np.bool_]:
         """(N,) whether places (N, 2) are ``margin`` metres or more from every carriageway."""
-        return self.terrain.covers(places) & (self.network.kerb_distance(places) > margin)
+        return self.terrain.covers(places) & (self.terrain.kerb_distance(places) > margin)
 
     def put(self, mesh: Mesh, place: Array, yaw: float, sink: float = 0.0) -> None:
         """Set a mesh on the ground, ``sink`` metres deep."""
-        height = float(standing_height(self.terrain, self.network, place[None])[0])
+        height = float(self.terrain.standing_height(place[None])[0])
         self.parts.append(mesh.moved((float(place[0]), float(place[1]), height - sink), yaw))
 
     def scatter(
@@ -98,9 +98,8 @@ class Plot:
         keep = self.off_road(places, margin)
         for place, yaw in zip(places[keep], yaws[keep], strict=True):
             mesh = makers(self.rng)
-            low, high = mesh.bounds
-            trunk = mesh.vertices[mesh.vertices[:, 2] < 1.5]
-            reach = float(np.abs(trunk[:, :2]).max()) if len(trunk) else float(high[0] - low[0])
+            foot = mesh.vertices[mesh.vertices[:, 2] < 1.5, :2]
+            reach = float(np.abs(foot).max()) if len(foot) else 1.0
             if self.is_free(place, reach):
                 self.take(place, reach)
                 self.put(mesh, place, float(yaw), 0.05)
@@ -116,7 +115,7 @@ class Plot:
             if end - start < 4:
                 continue
             stretch = line[start:end]
-            heights = standing_height(self.terrain, self.network, stretch)
+            heights = self.terrain.standing_height(stretch)
             self.parts.append(maker(np.concatenate([stretch, heights[:, None]], axis=1), self.rng))
             self.take(stretch, radius)
 
@@ -133,7 +132,7 @@ class Plot:
         self.take(spots, radius)
         size = (0.6 * length, 0.8 * width)
         corners = corners_of(place[None], np.array([yaw]), size).reshape(4, 2)
-        heights = standing_height(self.terrain, self.network, corners)[None]
+        heights = self.terrain.standing_height(corners)[None]
         z, pitch, roll = attitude(heights, size)
         centre = np.array([[place[0], place[1], z[0]]])
         pose = poses_of(centre, np.array([[yaw, pitch[0], roll[0]]]))[0]

@@ -19,6 +19,8 @@ Float = NDArray[np.float32]
 PASSES = 3
 """A ray goes through so many see-through surfaces at most, less one."""
 STEP_PAST_M = 0.01
+KNOTS = 65
+"""Columns at which an actor's bearing is worked out exactly before it is culled."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,18 +96,32 @@ def aim(
     """
     cos, sin = np.cos(azimuth).astype(np.float32), np.sin(azimuth).astype(np.float32)
     beams = sensor.directions().astype(np.float32)
-    x = cos[:, None] * beams[:, 0] - sin[:, None] * beams[:, 1]
-    y = sin[:, None] * beams[:, 0] + cos[:, None] * beams[:, 1]
-    local = np.stack([x, y, np.broadcast_to(beams[:, 2], x.shape)], axis=2)
-    true = local
-    if jitter_rad > 0:
-        true = local + np.float32(jitter_rad) * rng.standard_normal(local.shape, dtype=np.float32)
-        true /= np.sqrt(np.einsum("cbi,cbi->cb", true, true))[..., None]
+    local = np.empty((len(azimuth), len(beams), 3), dtype=np.float32)
+    local[..., 0] = cos[:, None] * beams[:, 0] - sin[:, None] * beams[:, 1]
+    local[..., 1] = sin[:, None] * beams[:, 0] + cos[:, None] * beams[:, 1]
+    local[..., 2] = beams[:, 2]
+    true = _jittered(local, sensor, jitter_rad, rng) if jitter_rad > 0 else local
     rotation = poses[:, :3, :3].astype(np.float32)
     direction = true @ np.swapaxes(rotation, 1, 2)
     raised = sensor.height.astype(np.float32)[:, None] * rotation[:, None, :, 2]
     origin = poses[:, None, :3, 3].astype(np.float32) + raised
     return Rays(times, azimuth, origin, direction, local, poses)
+
+
+def _jittered(
+    local: Float, sensor: Sensor, sigma: float, rng: np.random.Generator
+) -> Float:
+    """Directions turned a little sideways and up; their length stays one to first order."""
+    scale = np.float32(sigma * np.sqrt(12.0))
+    sideways = scale * (rng.random(local.shape[:2], dtype=np.float32) - np.float32(0.5))
+    upward = scale * (rng.random(local.shape[:2], dtype=np.float32) - np.float32(0.5))
+    tilt = upward * np.tan(sensor.elevation).astype(np.float32)
+    x, y = local[..., 0], local[..., 1]
+    true = np.empty_like(local)
+    true[..., 0] = x - sideways * y - tilt * x
+    true[..., 1] = y + sideways * x - tilt * y
+    true[..., 2] = local[..., 2] + upward * np.cos(sensor.elevation).astype(np.float32)
+    return true
 
 
 class Stage:
@@ -190,16 +206,18 @@ class Stage:
         self, actor: Actor, rays: Rays, sensor: Sensor, reach_m: float
     ) -> list[Visit]:
         """The rays that may meet an actor, in the actor's own coordinates at each ray's time."""
-        poses = actor.trajectory.poses_at(rays.times)
-        size = np.array(actor.model.size_lwh)
-        radius = 0.5 * float(np.linalg.norm(size)) + 0.05
-        middle = poses[:, :3, 3] + 0.5 * size[2] * poses[:, :3, 2]
-        offset = middle - rays.world_from_sensor[:, :3, 3]
-        local = np.einsum("cij,ci->cj", rays.world_from_sensor[:, :3, :3], offset)
-        distance = np.maximum(np.linalg.norm(local, axis=1), 1e-3)
-        if distance.min() > reach_m + radius:
+        height = actor.model.size_lwh[2]
+        radius = 0.5 * float(np.linalg.norm(actor.model.size_lwh)) + 0.05 + 0.1 * height
+        some = np.unique(np.linspace(0, len(rays.times) - 1, KNOTS).astype(int))
+        offset = actor.trajectory.place_at(rays.times[some]) - rays.world_from_sensor[some, :3, 3]
+        offset[:, 2] += 0.5 * height
+        if np.linalg.norm(offset, axis=1).min() > reach_m + radius:
             return []
+        coarse = np.einsum("cij,ci->cj", rays.world_from_sensor[some, :3, :3], offset)
+        every = np.arange(len(rays.times))
+        local = np.stack([np.interp(every, some, axis) for axis in coarse.T], axis=1)
         flat = np.maximum(np.hypot(local[:, 0], local[:, 1]), 1e-3)
+        distance = np.hypot(flat, local[:, 2])
         wide = np.where(flat > radius, np.arcsin(np.minimum(radius / flat, 1.0)), np.pi)
         bearing = np.arctan2(local[:, 1], local[:, 0]) - rays.azimuth
         up = np.arctan2(local[:, 2], flat)
@@ -214,20 +232,20 @@ class Stage:
             level = sensor.elevation[members]
             beams = members[(level > low) & (level < high)]
             if len(beams):
-                found.append(self._visit(actor, rays, poses, columns, beams))
+                found.append(self._visit(actor, rays, columns, beams))
         return found
 
     def _visit(
-        self, actor: Actor, rays: Rays, poses: Array, columns: NDArray[np.int64],
-        beams: NDArray[np.int64],
+        self, actor: Actor, rays: Rays, columns: NDArray[np.int64], beams: NDArray[np.int64]
     ) -> Visit:  # fmt: skip
         mesh = actor.mesh_at(float(rays.times[columns[len(columns) // 2]]))
         solid = self._solids.get(id(mesh.vertices))
         if solid is None:
             solid = self._solids.setdefault(id(mesh.vertices), Solid.of(mesh, self._caster))
-        rotation = poses[columns, :3, :3].astype(np.float32)
+        poses = actor.trajectory.poses_at(rays.times[columns])
+        rotation = poses[:, :3, :3].astype(np.float32)
         pick = np.ix_(columns, beams)
-        place = poses[columns, None, :3, 3].astype(np.float32)
+        place = poses[:, None, :3, 3].astype(np.float32)
         origin = (rays.origin[pick] - place) @ rotation
         direction = rays.direction[pick] @ rotation
         numbers = (columns[:, None] * rays.origin.shape[1] + beams).ravel()

@@ -35,6 +35,8 @@ STYLES: dict[str, dict[str, float]] = {
 }
 """How often a block of each style occurs in a scene of each kind."""
 
+VARIANTS = 6
+"""Different trees, bushes, bins ... of a kind in one world."""
 STREET_CARS = {"car": 20.0, "van": 3.0, "truck": 0.5, "trailer": 0.4, "motorcycle": 0.6}
 
 
@@ -87,7 +89,7 @@ class StreetBuilder:
         self.plot = plot
         self.catalogue = catalogue
         self.rng = plot.rng
-        self.trees = [draw_tree(self.rng) for _ in range(6)]
+        self._pools: dict[Callable[[np.random.Generator], Mesh], list[Mesh]] = {}
         self.crowd = float(self.rng.beta(2, 2))
         self.styles: dict[str, Callable[[Block], None]] = {
             "terrace": self._terrace, "houses": self._houses, "park": self._park,
@@ -161,7 +163,7 @@ class StreetBuilder:
             gap = rng.uniform(7, 16)
             along = np.arange(rng.uniform(0, gap), block.length, gap)
             places, _ = block.at(along, at_kerb + 0.2)
-            self.plot.scatter(self.tree, places, rng.uniform(0, 6.28, len(along)), 0.3)
+            self.plot.scatter(self.some(draw_tree), places, rng.uniform(0, 6.28, len(along)), 0.3)
         busy = style in ("terrace", "park", "carpark") and walk > 1.5
         for _ in range(rng.poisson(block.length / 30 * (1.0 if busy else 0.3))):
             along, lateral = rng.uniform(0, block.length), block.road.half_m + 0.5 + rng.uniform(0, max(walk - 0.8, 0.2))
@@ -174,11 +176,19 @@ class StreetBuilder:
         if self.plot.off_road(place[None], 0.4)[0]:
             self.plot.park(self.catalogue.draw_any(name), place, float(heading) + self.rng.normal(0, 1.5))
 
-    def tree(self, rng: np.random.Generator) -> Mesh:
-        """One of this world's trees, turned and scaled."""
-        tree = self.trees[int(rng.integers(len(self.trees)))]
-        scale = rng.uniform(0.75, 1.25)
-        return tree.moved((0, 0, 0), rng.uniform(0, 6.28), scale)
+    def some(self, maker: Callable[[np.random.Generator], Mesh]) -> Callable[..., Mesh]:
+        """A maker that takes one of this world's few things of the kind, turned and scaled."""
+        pool = self._pools.setdefault(maker, [])
+
+        def take(rng: np.random.Generator) -> Mesh:
+            choice = int(rng.integers(VARIANTS))
+            if choice >= len(pool):
+                pool.append(maker(rng))
+                choice = len(pool) - 1
+            stretch = tuple(rng.uniform(0.82, 1.22) * rng.uniform(0.92, 1.08, 3))
+            return pool[choice].moved((0.0, 0.0, 0.0), 0.0, stretch)
+
+        return take
 
     def _scatter(
         self, maker: Callable[[np.random.Generator], Mesh], block: Block, count: int, near: float,
@@ -188,7 +198,7 @@ class StreetBuilder:
         rng = self.rng
         places, heading = block.at(rng.uniform(0, block.length, count), rng.uniform(near, far, count))
         turn = 0.5 * np.pi * rng.integers(4, size=count) if along_street else rng.uniform(0, 6.28, count)
-        self.plot.scatter(maker, places, heading + turn, 0.35)
+        self.plot.scatter(self.some(maker), places, heading + turn, 0.35)
 
     def _car_sized(self, block: Block, count: int, near: float, far: float) -> None:
         for _ in range(count):
@@ -265,7 +275,7 @@ class StreetBuilder:
     def _garden(self, block: Block, setback: float) -> None:
         rng, front = self.rng, block.frontage
         self._scatter(bush, block, rng.poisson(block.length / 9), front + 0.8, front + setback)
-        self._scatter(self.tree, block, rng.poisson(block.length / 16), front + 1.5, front + setback + 14)
+        self._scatter(draw_tree, block, rng.poisson(block.length / 16), front + 1.5, front + setback + 14)
         self._car_sized(block, rng.poisson(block.length / 25), front + 1, front + setback + 3)
         back = front + setback + rng.uniform(14, 20)
         self._barrier(block, back, {"hedge": 3, "boards": 1, "wire_mesh": 1, "wall": 1})
@@ -274,14 +284,14 @@ class StreetBuilder:
         rng, front = self.rng, block.frontage
         if rng.random() < 0.6:
             self._barrier(block, front + 0.4, {"hedge": 3, "wall": 2, "railing": 2, "wire_mesh": 1, "bank": 1})
-        self._scatter(self.tree, block, rng.poisson(block.length / 7), front + 1, front + 30)
+        self._scatter(draw_tree, block, rng.poisson(block.length / 7), front + 1, front + 30)
         self._scatter(bush, block, rng.poisson(block.length / 5), front + 0.8, front + 20)
         self._scatter(tufts, block, rng.poisson(block.length / 6), front + 0.5, front + 15)
         self._car_sized(block, rng.poisson(block.length / 9), front + 0.8, front + 18)
 
     def _wood(self, block: Block) -> None:
         rng, front = self.rng, block.frontage
-        self._scatter(self.tree, block, rng.poisson(block.length / 3.5), front + 1.5, front + 25)
+        self._scatter(draw_tree, block, rng.poisson(block.length / 3.5), front + 1.5, front + 25)
         self._scatter(bush, block, rng.poisson(block.length / 4), front + 1.2, front + 14)
         self._scatter(tufts, block, rng.poisson(block.length / 2.5), front + 0.6, front + 10)
 
@@ -290,7 +300,7 @@ class StreetBuilder:
         if rng.random() < 0.55:
             kinds = {"hedge": 3, "wire_mesh": 1, "guard_rail": 2, "railing": 1, "wall": 1, "bank": 1}
             self._barrier(block, front + rng.uniform(0.8, 3), kinds)
-        self._scatter(self.tree, block, rng.poisson(block.length / 25), front + 2, front + 40)
+        self._scatter(draw_tree, block, rng.poisson(block.length / 25), front + 2, front + 40)
         self._scatter(bush, block, rng.poisson(block.length / 14), front + 1.5, front + 25)
         self._scatter(tufts, block, rng.poisson(block.length / 3), front + 0.6, front + 12)
         self._car_sized(block, rng.poisson(block.length / 45), front + 2, front + 25)
@@ -330,7 +340,7 @@ class StreetBuilder:
                     turn = tilt * rng.choice([-1, 1]) + rng.normal(0, 0.04)
                     self.plot.park(car, place, float(heading) + turn)
         self._car_sized(block, rng.poisson(block.length / 15), front + 1, front + 30)
-        self._scatter(self.tree, block, rng.poisson(block.length / 15), front + 1, front + 30)
+        self._scatter(draw_tree, block, rng.poisson(block.length / 15), front + 1, front + 30)
 
     def _screen(self, block: Block) -> None:
         """Beside a fast road: rails, noise walls, banks; trees beyond."""
@@ -340,6 +350,6 @@ class StreetBuilder:
         name = str(rng.choice(["noise_wall", "bank", "hedge", "wire_mesh", "wall"]))
         line = block.line(0, block.length, front + rng.uniform(2.5, 7))
         self.plot.run_barrier(BARRIERS[name], line, 0.5)
-        self._scatter(self.tree, block, rng.poisson(block.length / 6), front + 6, front + 30)
+        self._scatter(draw_tree, block, rng.poisson(block.length / 6), front + 6, front + 30)
         self._scatter(bush, block, rng.poisson(block.length / 6), front + 2, front + 12)
         self._scatter(tufts, block, rng.poisson(block.length / 4), front + 1.2, front + 8)

@@ -24,27 +24,45 @@ class Terrain:
     Attributes:
         corner: (2,) x, y of the first grid point, metres.
         heights: (X, Y) metres.
+        kerb: (X, Y) metres from the nearest kerb, negative on a carriageway.
+        walk: (X, Y) metres from the outer edge of the nearest pavement, negative inside.
         kerb_m: How much higher pavements lie than the road.
     """
 
     corner: Array
     heights: Array
+    kerb: Array
+    walk: Array
     kerb_m: float
 
     def height(self, places: Array) -> Array:
         """Metres (N,) at places (N, 2), exactly on the ground's triangles."""
+        return self._between(self.heights, places)
+
+    def kerb_distance(self, places: Array) -> Array:
+        """Metres (N,) from the nearest kerb of places (N, 2); negative on a carriageway."""
+        return self._between(self.kerb, places)
+
+    def walk_distance(self, places: Array) -> Array:
+        """Metres (N,) from the outer edge of the nearest pavement; negative inside."""
+        return self._between(self.walk, places)
+
+    def standing_height(self, places: Array) -> Array:
+        """Metres (N,) on which one stands: the ground, or the pavement that lies on it."""
+        on_walk = (self.kerb_distance(places) >= 0) & (self.walk_distance(places) < 0)
+        return self.height(places) + np.where(on_walk, self.kerb_m, 0.0)
+
+    def _between(self, values: Array, places: Array) -> Array:
         scaled = (np.asarray(places) - self.corner) / CELL_M
-        limit = np.array(self.heights.shape) - 1.001
-        scaled = np.clip(scaled, 0.0, limit)
+        scaled = np.clip(scaled, 0.0, np.array(values.shape) - 1.001)
         cell = scaled.astype(np.int64)
         u, v = (scaled - cell).T
         i, j = cell.T
-        low, high = self.heights[i, j], self.heights[i + 1, j + 1]
-        side = np.where(u > v, self.heights[i + 1, j], self.heights[i, j + 1])
-        return np.where(
-            u > v, low + u * (side - low) + v * (high - side),
-            low + v * (side - low) + u * (high - side),
-        )  # fmt: skip
+        low, high = values[i, j], values[i + 1, j + 1]
+        steep = u > v
+        side = np.where(steep, values[i + 1, j], values[i, j + 1])
+        first, second = np.where(steep, u, v), np.where(steep, v, u)
+        return low + first * (side - low) + second * (high - side)
 
     def covers(self, places: Array, margin: float = 1.0) -> NDArray[np.bool_]:
         """Whether places (N, 2) lie on the ground, ``margin`` metres from its edge."""
@@ -60,11 +78,13 @@ def shape_terrain(network: Network, way: Array, rng: np.random.Generator) -> Ter
     x = low[0] + CELL_M * np.arange(shape[0])
     y = low[1] + CELL_M * np.arange(shape[1])
     places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=2).reshape(-1, 2)
-    heights = _rolling(places, rng) + _crown(network, places, rng) + _banks(network, places, rng)
+    kerb, walk = network.kerb_distance(places), network.walk_distance(places)
+    heights = _rolling(places, rng) + _crown(network, kerb, rng) + _banks(network, places, walk, rng)
     for island in network.islands:
         gap = np.linalg.norm(places - island[:2], axis=1)
         heights += rng.uniform(0, 1.5) * np.clip(1 - gap / island[2], 0, 1)
-    return Terrain(low, heights.reshape(shape), float(rng.choice([0.05, 0.1, 0.13, 0.16])))
+    fields = (values.reshape(shape) for values in (heights, kerb, walk))
+    return Terrain(low, *fields, float(rng.choice([0.05, 0.1, 0.13, 0.16])))
 
 
 def _rolling(places: Array, rng: np.random.Generator) -> Array:
@@ -81,16 +101,14 @@ def _rolling(places: Array, rng: np.random.Generator) -> Array:
     return heights
 
 
-def _crown(network: Network, places: Array, rng: np.random.Generator) -> Array:
+def _crown(network: Network, kerb: Array, rng: np.random.Generator) -> Array:
     """The middle of a road stands higher than its sides."""
-    height, road = rng.uniform(0.0, 0.12), network.roads[0]
-    gap = road.tree.query(places)[0] / max(road.half_m, 1.0)
-    return height * np.clip(1 - gap**2, 0, 1)
+    height, half = rng.uniform(0.0, 0.12), max(network.roads[0].half_m, 1.0)
+    return height * np.clip(1 - (1 + kerb / half) ** 2, 0, 1)
 
 
-def _banks(network: Network, places: Array, rng: np.random.Generator) -> Array:
+def _banks(network: Network, places: Array, out: Array, rng: np.random.Generator) -> Array:
     """Banks, cuttings and ditches beside the road, and rough ground beyond it."""
-    out = network.walk_distance(places)
     open_land = network.kind in ("rural", "highway", "bridge", "tunnel", "suburban")
     chance = 0.7 if open_land else 0.2
     heights = np.where(out > 1.0, 0.04 * rng.standard_normal(len(places)), 0.0)
@@ -111,12 +129,6 @@ def _lateral(line: Array, places: Array) -> Array:
     ahead = line[-1] - line[0]
     offset = places - line[len(line) // 2]
     return ahead[0] * offset[:, 1] - ahead[1] * offset[:, 0]
-
-
-def standing_height(terrain: Terrain, network: Network, places: Array) -> Array:
-    """Metres (N,) on which one stands at places (N, 2): the ground, or the pavement on it."""
-    on_walk = (network.kerb_distance(places) >= 0) & (network.walk_distance(places) < 0)
-    return terrain.height(places) + np.where(on_walk, terrain.kerb_m, 0.0)
 
 
 def attitude(heights: Array, size: tuple[float, float]) -> tuple[Array, Array, Array]:
@@ -158,7 +170,7 @@ def ground_mesh(terrain: Terrain, network: Network, rng: np.random.Generator) ->
     flat = vertices.reshape(-1, 3)
     mesh = of_triangles(flat, triangles, Finish(Surface.ROAD, 0.2))
     centres = np.concatenate([flat[start, :2] + [1.2, 0.6], flat[start, :2] + [0.6, 1.2]])
-    surface = _surface_at(network, centres, rng)
+    surface = _surface_at(terrain, network, centres, rng)
     shade = np.array([0.2] * 32)
     shade[[Surface.ROAD, Surface.SIDEWALK, Surface.GRASS, Surface.GRAVEL]] = (
         rng.uniform(0.1, 0.3), rng.uniform(0.2, 0.4), rng.uniform(0.3, 0.6), rng.uniform(0.2, 0.45),
@@ -169,14 +181,15 @@ def ground_mesh(terrain: Terrain, network: Network, rng: np.random.Generator) ->
     )
 
 
-def _surface_at(network: Network, places: Array, rng: np.random.Generator) -> NDArray[np.int64]:
+def _surface_at(
+    terrain: Terrain, network: Network, places: Array, rng: np.random.Generator
+) -> NDArray[np.int64]:
     town = network.kind in ("straight", "curved", "crossing", "square", "industrial")
     paved = rng.random() < (0.6 if town else 0.1)
     beyond = Surface.SIDEWALK if paved else Surface.GRASS
     if network.kind == "industrial":
         beyond = Surface.GRAVEL
-    kerb = network.kerb_distance(places)
-    walk = network.walk_distance(places)
+    kerb, walk = terrain.kerb_distance(places), terrain.walk_distance(places)
     surface = np.where(kerb < 0, Surface.ROAD, np.where(walk < 0, Surface.SIDEWALK, beyond))
     surface[network.in_square(places) & (kerb >= 0)] = Surface.SIDEWALK
     return surface

@@ -67,7 +67,7 @@ class Traffic:
     def admit(self, model: Model, way: Way, margin: float = 0.25, *, on_road: bool = True) -> bool:
         """Let a mover in, unless it would touch another one or, off the road, what stands."""
         world = self.world
-        trajectory = follow(way, model, self.times, world.network, world.terrain)
+        trajectory = follow(way, model, self.times, world.terrain)
         places, yaw = trajectory.places[self._probe, :2], trajectory.angles[self._probe, 0]
         if not world.terrain.covers(places, 4.0).all():
             return False

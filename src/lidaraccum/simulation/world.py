@@ -14,6 +14,7 @@ from lidaraccum.simulation.overhead import build_overhead
 from lidaraccum.simulation.plot import Plot, Still
 from lidaraccum.simulation.roads import Network
 from lidaraccum.simulation.streets import StreetBuilder
+from lidaraccum.simulation.vegetation import draw_tree
 from lidaraccum.simulation.terrain import Terrain, ground_mesh, kerb_mesh, shape_terrain
 
 Array = NDArray[np.float64]
@@ -75,10 +76,10 @@ def _fill_squares(plot: Plot, builder: StreetBuilder) -> None:
         count = int(rng.integers(15, 45))
         angle, out = rng.uniform(0, 2 * np.pi, count), radius * np.sqrt(rng.uniform(0, 1, count))
         places = np.array([x, y]) + out[:, None] * np.stack([np.cos(angle), np.sin(angle)], 1)
-        makers = (*CAR_SIZED, *KERB_SIDE, builder.tree, builder.tree, builder.tree)
+        makers = (*CAR_SIZED, *KERB_SIDE, draw_tree, draw_tree, draw_tree)
         for place in places:
             maker = makers[int(rng.integers(len(makers)))]
-            plot.scatter(maker, place[None], rng.uniform(0, 6.28, 1), 0.8)
+            plot.scatter(builder.some(maker), place[None], rng.uniform(0, 6.28, 1), 0.8)
         chances = {"pedestrian": 8.0, "bicycle": 3, "car": 2, "van": 1, "oddity": 1.5, "pram": 1}
         for place in np.array([x, y]) + rng.uniform(-0.8, 0.8, (rng.poisson(8), 2)) * radius:
             if plot.off_road(place[None], 2.5)[0]:
@@ -92,5 +93,5 @@ def _plant_islands(plot: Plot, builder: StreetBuilder) -> None:
         for _ in range(int(rng.integers(0, 7))):
             angle, out = rng.uniform(0, 2 * np.pi), rng.uniform(0, 0.7) * radius
             place = np.array([x + out * np.cos(angle), y + out * np.sin(angle)])
-            maker = (builder.tree, CAR_SIZED[int(rng.integers(len(CAR_SIZED)))])[int(rng.integers(2))]
-            plot.scatter(maker, place[None], rng.uniform(0, 6.28, 1), 0.5)
+            maker = (draw_tree, CAR_SIZED[int(rng.integers(len(CAR_SIZED)))])[int(rng.integers(2))]
+            plot.scatter(builder.some(maker), place[None], rng.uniform(0, 6.28, 1), 0.5)
