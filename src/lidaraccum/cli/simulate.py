@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
+from dataclasses import asdict, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -55,7 +55,7 @@ Job = tuple["DriveSettings", Path, str, bool]
 @options.output_options
 @options.talk_options
 def simulate(**params: Any) -> None:
-    """Make labelled drives through made-up streets, in the layout that accumulate and train read."""
+    """Make labelled drives through made-up streets, in the layout that accumulate reads."""
     from lidaraccum.io.atomic import check_free
     from lidaraccum.simulation.drive import DriveSettings
 
@@ -100,9 +100,17 @@ def made(jobs: list[Job], at_once: int) -> Any:
 
 def make(job: Job) -> Path:
     """Simulate one drive and write it."""
-    from lidaraccum.io.labelled import write_labelled_sequence
+    from lidaraccum.io.labelled import LabelledSettings, write_labelled_sequence
     from lidaraccum.simulation.drive import simulate as simulate_drive
 
     settings, folder, kind, overwrite = job
-    write_labelled_sequence(folder, simulate_drive(settings), kind, overwrite)
+    drive = simulate_drive(settings)
+    how = LabelledSettings(
+        format=kind,
+        sensor=drive.drawn.sensor.name,
+        licence="MIT; simulated by lidaraccum",
+        notes={"simulation": asdict(settings)},
+        overwrite=overwrite,
+    )
+    write_labelled_sequence(folder, drive, how)
     return folder
