@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.data.frame import Frame
+from lidaraccum.registration.firing import Seam
 
 
 class SweepClock(Protocol):
@@ -46,25 +47,23 @@ class RotatingSweep:
     shift the pose.
 
     Attributes:
-        seam_rad: Azimuth, counterclockwise from x, at which a sweep starts and ends.
-        direction: +1 counterclockwise seen from above, -1 clockwise.
+        seam: Where a sweep starts and which way it turns.
         duration_s: Seconds a full turn takes.
     """
 
-    seam_rad: float
-    direction: int
+    seam: Seam
     duration_s: float
 
     def fractions(self, frame: Frame, interval_s: float) -> NDArray[np.float64] | None:
         """Turn of each point from the middle of the sweep, times duration over interval."""
         share = min(self.duration_s / interval_s, 1.0)
-        return share * turn_fractions(frame.points, self.seam_rad, self.direction)
+        return share * turn_fractions(frame.points, self.seam)
 
 
-def turn_fractions(points: NDArray[Any], seam_rad: float, direction: int) -> NDArray[np.float64]:
+def turn_fractions(points: NDArray[Any], seam: Seam) -> NDArray[np.float64]:
     """Part of the turn (N,), -0.5..0.5, at which a spinning sensor looked at points (N, 3)."""
     azimuth = np.arctan2(points[:, 1], points[:, 0]).astype(np.float64)
-    return np.mod(direction * (azimuth - seam_rad) / (2 * np.pi), 1.0) - 0.5
+    return np.mod(seam.direction * (azimuth - seam.azimuth_rad) / (2 * np.pi), 1.0) - 0.5
 
 
 def transform_along(

@@ -1,38 +1,31 @@
-"""Ego-motion of a whole sequence from points alone, or checked and refined from given poses."""
+"""Ego-motion of a whole sequence from points alone, or from given poses, checked or refined."""
 
 from __future__ import annotations
 
-import logging
+from collections import deque
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
-from itertools import islice
+from itertools import islice, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.data.frame import Frame
-from lidaraccum.data.registered import RegisteredFrame, RegistrationQuality
+from lidaraccum.data.registered import RegisteredFrame
 from lidaraccum.errors import InputError
 from lidaraccum.geometry import rigid
+from lidaraccum.registration.azimuth_time import Glimpse
 from lidaraccum.registration.deskew import Compensated, SweepClock, TimedSweep
-from lidaraccum.registration.icp import assess
-from lidaraccum.registration.locate import Hypothesis, Located, proposed, refine, search
+from lidaraccum.registration.locate import Hypothesis
 from lidaraccum.registration.pace import Pace
-from lidaraccum.registration.proposals import Reach
-from lidaraccum.registration.quality import Judge
-from lidaraccum.registration.scan import Scan, StaticMask, prepare, usable_points
+from lidaraccum.registration.scan import StaticMask, usable_points
 from lidaraccum.registration.settings import RegistrationSettings
-from lidaraccum.registration.surface_map import SurfaceMap
+from lidaraccum.registration.sweep import SweepDetector
+from lidaraccum.registration.tracker import Tracker
 
-logger = logging.getLogger(__name__)
+WINDOW = 5
+"""Frames looked at together for the motion within a sweep."""
 
-MAX_ACCELERATION = 8.0
-"""m/s²: a step that differs from constant velocity by more is compared with its rivals."""
-
-SAME_TWIST_M, SAME_TWIST_RAD = 0.02, 0.0005
-"""A frame is deskewed again when its motion turns out to differ by more from what was assumed."""
-
-MAX_PASSES = 3
+Indexed = tuple[int, Frame]
 
 
 def register(
@@ -65,6 +58,7 @@ def register(
     odometry = Odometry(settings, given, static_mask)
     yield from odometry.open(opening)
     count = len(opening)
+    del opening
     for index, frame in stream:
         count += 1
         yield odometry.follow(index, frame)
@@ -73,7 +67,7 @@ def register(
 
 
 class Odometry:
-    """The state between frames: the local map, the last pose, the last motion."""
+    """A sequence on its way through registration."""
 
     def __init__(
         self,
@@ -81,124 +75,111 @@ class Odometry:
         given: NDArray[np.float64] | None,
         static_mask: StaticMask | None,
     ) -> None:
-        self.settings = settings
-        self.given = given
-        self.static_mask = static_mask
-        self.pace = Pace()
-        self.clock: SweepClock = Compensated()
-        self._reset()
+        self._settings = settings
+        self._given = given
+        self._static_mask = static_mask
+        self._pace = Pace()
+        self._detector = SweepDetector(settings)
+        self._recent: deque[tuple[Frame, Glimpse]] = deque(maxlen=WINDOW)
+        self._last: tuple[int, rigid.Pose] | None = None
+        self._stamp: float | None = None
+        self._tracker = Tracker(settings, self._pace, Compensated())
 
-    def _reset(self) -> None:
-        reach = self.settings.max_range_m * 1.1
-        self.surface = SurfaceMap(self.settings.voxel_m, reach)
-        self.judge = Judge(self.settings)
-        self.last: RegisteredFrame | None = None
-        self.twist: NDArray[np.float64] | None = None
-
-    def open(self, opening: list[tuple[int, Frame]]) -> list[RegisteredFrame]:
+    def open(self, opening: list[Indexed]) -> list[RegisteredFrame]:
         """Solve the first frames together: once to learn the motion, once more with it."""
         if not opening:
             return []
-        for (_, earlier), (_, later) in zip(opening, opening[1:], strict=False):
-            self.pace.see(earlier.stamp, later.stamp)
-        if self.settings.deskew == "auto" and opening[0][1].time_offset is not None:
-            self.clock = TimedSweep()
-        first_pass = [self.follow(index, frame) for index, frame in opening]
-        if len(opening) < 2 or isinstance(self.clock, Compensated):
+        for (_, earlier), (_, later) in pairwise(opening):
+            self._pace.see(earlier.stamp, later.stamp)
+        has_times = self._settings.deskew == "auto" and opening[0][1].time_offset is not None
+        first_clock: SweepClock = TimedSweep() if has_times else Compensated()
+        first_pass = self._run(opening, first_clock, None)
+        if len(first_pass) < 2:
             return first_pass
-        twist = self._step_twist(first_pass[0], first_pass[1])
-        self._reset()
-        self.twist = twist
-        return [self.follow(index, frame) for index, frame in opening]
+        clock = self._look_at_sweep() or first_clock
+        twist = self._opening_twist(first_pass)
+        if clock == first_clock == Compensated() and self._is_steady(first_pass):
+            return first_pass
+        second_pass = self._run(opening, clock, twist)
+        if clock == first_clock and _mean_overlap(second_pass) < _mean_overlap(first_pass):
+            return self._run(opening, clock, None)
+        return second_pass
 
     def follow(self, index: int, raw: Frame) -> RegisteredFrame:
         """Register the next frame and add it to the map."""
-        usable = usable_points(raw, self.settings, self.static_mask)
-        if self.last is None:
-            return self._start(index, raw, usable)
-        self.pace.see(self.last.frame.stamp, raw.stamp)
-        steps = self.pace.steps(self.last.frame.stamp, raw.stamp)
-        known = self.twist is not None
-        twist = self.twist if self.twist is not None else np.zeros(6)
-        predicted = self.last.world_from_sensor @ rigid.exponential(twist * steps)
-        if self.given is not None:
-            predicted = self._given(index)
-        for _ in range(MAX_PASSES):
-            scan = self._prepare(index, raw, usable, twist)
-            located = self._locate(scan, predicted, steps, known)
-            pose = located.alignment.world_from_sensor
-            found = rigid.logarithm(rigid.invert(self.last.world_from_sensor) @ pose) / steps
-            change = np.abs(found - twist)
-            twist, predicted, known = found, pose, True
-            if (
-                not isinstance(scan.frame, Frame)
-                or (change[3:].max() < SAME_TWIST_M and change[:3].max() < SAME_TWIST_RAD)
-                or not scan.deskewed
-            ):
-                break
-        return self._accept(scan, located, twist)
-
-    def _start(self, index: int, raw: Frame, usable: NDArray[np.bool_]) -> RegisteredFrame:
-        pose = np.eye(4) if self.given is None else self._given(index)
-        twist = self.twist if self.twist is not None else np.zeros(6)
-        scan = self._prepare(index, raw, usable, twist)
-        quality = RegistrationQuality("first", overlap=1.0, residual_m=0.0)
-        return self._remember(scan, pose, quality)
-
-    def _prepare(
-        self, index: int, raw: Frame, usable: NDArray[np.bool_], twist: NDArray[np.float64]
-    ) -> Scan:
-        motion = (self.clock, twist, self.pace.interval_s)
-        return prepare(index, raw, usable, motion, self.settings.source_voxel_m)
-
-    def _locate(self, scan: Scan, predicted: rigid.Pose, steps: float, known: bool) -> Located:
-        if self.given is not None and self.settings.poses_mode == "given":
-            return Located("given", assess(self.surface, scan.source, predicted))
-        name = "previous" if self.given is None else "given"
-        if known or self.given is not None:
-            found = refine(self.surface, scan.source, Hypothesis(name, predicted))
-            if self.judge.trusts(found) and self._is_smooth(found, predicted, steps):
-                return found
-        assert self.last is not None
-        still = self.last.world_from_sensor
-        interval = steps * self.pace.interval_s
-        reach = Reach(
-            min(self.settings.max_speed_mps * interval, 60.0),
-            min(np.deg2rad(self.settings.max_turn_dps) * interval, np.pi),
-        )
-        axes = (2,) if known else (2, 0, 1)
-        starts = [Hypothesis(name, predicted), Hypothesis("still", still)]
-        starts += proposed(self.surface, scan.source, predicted, reach, axes)
-        return search(self.surface, scan.source, starts)
-
-    def _is_smooth(self, found: Located, predicted: rigid.Pose, steps: float) -> bool:
-        interval = steps * self.pace.interval_s
-        away = found.alignment.world_from_sensor[:3, 3] - predicted[:3, 3]
-        return bool(np.linalg.norm(away) < 0.2 + MAX_ACCELERATION * interval**2)
-
-    def _accept(self, scan: Scan, located: Located, twist: NDArray[np.float64]) -> RegisteredFrame:
-        quality = self.judge.judge(located)
-        pose = located.alignment.world_from_sensor
-        self.twist = twist
-        return self._remember(scan, pose, quality)
-
-    def _remember(
-        self, scan: Scan, pose: rigid.Pose, quality: RegistrationQuality
-    ) -> RegisteredFrame:
-        self.surface.insert(rigid.transform(pose, scan.points), scan.index)
-        self.surface.forget_far(pose[:3, 3], scan.index)
-        registered = RegisteredFrame(scan.index, scan.frame, pose, quality, scan.deskewed)
-        # Only the stamp and the pose are needed of it: let go of the points.
-        self.last = replace(registered, frame=Frame(np.zeros((0, 3), np.float32), scan.raw.stamp))
+        if self._stamp is not None:
+            self._pace.see(self._stamp, raw.stamp)
+        registered = self._place(index, raw)
+        if not self._detector.done and len(self._recent) == WINDOW:
+            clock = self._look_at_sweep()
+            self._recent.clear()
+            if clock is not None:
+                self._tracker.clock = clock
         return registered
 
-    def _given(self, index: int) -> rigid.Pose:
-        assert self.given is not None
-        if index >= len(self.given):
-            raise InputError(f"there are {len(self.given)} poses, too few for the frames")
-        return self.given[index]
+    def _run(
+        self, opening: list[Indexed], clock: SweepClock, twist: NDArray[np.float64] | None
+    ) -> list[RegisteredFrame]:
+        self._tracker = Tracker(self._settings, self._pace, clock, twist)
+        self._last = self._stamp = None
+        self._recent.clear()
+        return [self._place(index, frame) for index, frame in opening]
 
-    def _step_twist(self, one: RegisteredFrame, two: RegisteredFrame) -> NDArray[np.float64]:
-        steps = self.pace.steps(one.frame.stamp, two.frame.stamp)
-        between = rigid.invert(one.world_from_sensor) @ two.world_from_sensor
-        return rigid.logarithm(between) / steps
+    def _place(self, index: int, raw: Frame) -> RegisteredFrame:
+        usable = usable_points(raw, self._settings, self._static_mask)
+        pose = None if self._given is None else self._given_pose(index)
+        if self._last is None:
+            registered = self._tracker.start(
+                index, raw, usable, np.eye(4) if pose is None else pose
+            )
+        elif pose is None:
+            registered = self._tracker.follow(index, raw, usable)
+        elif self._settings.poses_mode == "given":
+            registered = self._tracker.hold(index, raw, usable, pose)
+        else:
+            before, world_from_before = self._last
+            step = rigid.invert(self._given_pose(before)) @ pose
+            hints = (Hypothesis("given", world_from_before @ step), Hypothesis("given", pose))
+            registered = self._tracker.follow(index, raw, usable, hints)
+        self._last = index, registered.world_from_sensor
+        self._stamp = raw.stamp
+        if not self._detector.done and self._tracker.twist is not None:
+            points = raw.points[usable].astype(np.float64)
+            seen = Glimpse(points, registered.world_from_sensor, self._tracker.twist)
+            self._recent.append((raw, seen))
+        return registered
+
+    def _look_at_sweep(self) -> SweepClock | None:
+        if self._detector.done or len(self._recent) < 2:
+            return None
+        frames, glimpses = zip(*self._recent, strict=True)
+        return self._detector.look(frames, glimpses, self._pace.interval_s)
+
+    def _given_pose(self, index: int) -> rigid.Pose:
+        assert self._given is not None
+        if index >= len(self._given):
+            raise InputError(f"there are only {len(self._given)} poses for more frames")
+        return self._given[index]
+
+    def _opening_twist(self, first_pass: list[RegisteredFrame]) -> NDArray[np.float64]:
+        """Motion at the first frame: the first step, unless the next ones disagree with it."""
+        steps = self._step_twists(first_pass)
+        return steps[0] if self._is_steady(first_pass) else np.median(steps, axis=0)
+
+    def _is_steady(self, first_pass: list[RegisteredFrame]) -> bool:
+        steps = self._step_twists(first_pass)
+        allowed = 0.2 + 8.0 * self._pace.interval_s**2 * np.arange(1, len(steps) + 1)
+        away = np.linalg.norm(steps[:, 3:] - np.median(steps, axis=0)[3:], axis=1)
+        return bool((away < allowed).all())
+
+    def _step_twists(self, passed: list[RegisteredFrame]) -> NDArray[np.float64]:
+        twists = []
+        for one, two in pairwise(passed):
+            steps = self._pace.steps(one.frame.stamp, two.frame.stamp, 1)
+            between = rigid.invert(one.world_from_sensor) @ two.world_from_sensor
+            twists.append(rigid.logarithm(between) / steps)
+        return np.stack(twists)
+
+
+def _mean_overlap(registered: list[RegisteredFrame]) -> float:
+    return float(np.mean([one.quality.overlap for one in registered]))

@@ -29,11 +29,13 @@ class Pace:
         """The usual interval, seconds."""
         return float(np.median(self._intervals)) if self._intervals else DEFAULT_INTERVAL_S
 
-    def steps(self, earlier_s: float, later_s: float) -> float:
-        """How many usual intervals lie between two stamps; 1 where the stamps cannot tell."""
+    def steps(self, earlier_s: float, later_s: float, frames: int = 1) -> float:
+        """How many usual intervals lie between two stamps, ``frames`` apart.
+
+        Where stamps do not advance, the frames are counted instead.
+        """
         if later_s <= earlier_s:
-            return 1.0
+            return float(frames)
         steps = (later_s - earlier_s) / self.interval_s
-        if abs(steps - round(steps)) <= ROUNDING * max(round(steps), 1) and round(steps) >= 1:
-            steps = float(round(steps))
-        return float(min(steps, MAX_STEPS))
+        whole = max(round(steps), 1)
+        return float(whole) if abs(steps - whole) <= ROUNDING * whole else min(steps, MAX_STEPS)

@@ -1,0 +1,136 @@
+"""When a spinning sensor looks where, found by aligning its frames.
+
+A point of a fixed thing is seen at one azimuth in one frame and at another some frames later. In
+sweeps as measured these belong to different parts of the sweep's time, and the two disagree by the
+motion in between. So the time of each azimuth is an unknown as the pose is one, and point-to-plane
+distances determine it. It comes out as a sawtooth: its place is the seam, its sign the direction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidaraccum.geometry import rigid, voxel
+from lidaraccum.registration.firing import Seam
+from lidaraccum.registration.icp import align, jacobian, kernel_weights
+from lidaraccum.registration.settings import RegistrationSettings
+from lidaraccum.registration.surface_map import SurfaceMap
+
+SECTORS = 24
+"""Parts of the turn, each with its own time and its own rate of time."""
+
+SURFACE_M = 0.15
+"""Frames are thinned to this before they are compared."""
+
+MAX_RANGE_M = 80.0
+MAX_DISTANCE_M = 0.5
+MIN_SPREAD_M = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Glimpse:
+    """One frame of a window whose sweep is looked at.
+
+    Attributes:
+        points: (M, 3) float64 usable points as measured, metres, sensor coordinates.
+        world_from_sensor: (4, 4) estimate.
+        twist: (6,) motion over one frame interval about this frame, sensor axes.
+    """
+
+    points: NDArray[np.float64]
+    world_from_sensor: rigid.Pose
+    twist: NDArray[np.float64]
+
+
+class AzimuthTime:
+    """Normal equations of the time of each azimuth, summed over pairs of frames."""
+
+    def __init__(self, settings: RegistrationSettings) -> None:
+        self._settings = settings
+        self._matrix = np.zeros((2 * SECTORS, 2 * SECTORS))
+        self._vector = np.zeros(2 * SECTORS)
+
+    def add(self, target: Glimpse, source: Glimpse) -> None:
+        """Learn from one pair of frames; their relative pose is solved along and then dropped."""
+        surface = SurfaceMap(self._settings.voxel_m, radius_m=2 * MAX_RANGE_M)
+        surface.insert(_thinned(target.points, SURFACE_M), now=0)
+        points = _thinned(source.points, self._settings.source_voxel_m)
+        start = rigid.invert(target.world_from_sensor) @ source.world_from_sensor
+        pose = align(surface, points, start)
+        placed = rigid.transform(pose, points)
+        matches = surface.match(placed)
+        near = np.flatnonzero(np.abs(matches.distances) < MAX_DISTANCE_M)
+        if len(near) < 6:
+            return
+        rows, normals = matches.rows[near], matches.normals[near]
+        distances = matches.distances[near]
+        source_shift = _shift(source.twist, points[rows]) @ pose[:3, :3].T
+        target_shift = _shift(target.twist, matches.anchors[near])
+        slopes = np.concatenate(
+            [
+                jacobian(placed[rows] - pose[:3, 3], normals),
+                np.einsum("ij,ij->i", source_shift, normals)[:, None] * _basis(points[rows])
+                - np.einsum("ij,ij->i", target_shift, normals)[:, None]
+                * _basis(matches.anchors[near]),
+            ],
+            axis=1,
+        )
+        spread = max(1.48 * float(np.median(np.abs(distances))), MIN_SPREAD_M)
+        self._sum_up(slopes, distances, kernel_weights(matches)[near] / spread**2)
+
+    def _sum_up(
+        self,
+        slopes: NDArray[np.float64],
+        distances: NDArray[np.float64],
+        weights: NDArray[np.float64],
+    ) -> None:
+        weighted = slopes * weights[:, None]
+        matrix, vector = weighted.T @ slopes, weighted.T @ distances
+        pose, cross = matrix[:6, :6] + 1e-6 * np.eye(6), matrix[:6, 6:]
+        self._matrix += matrix[6:, 6:] - cross.T @ np.linalg.solve(pose, cross)
+        self._vector += vector[6:] - cross.T @ np.linalg.solve(pose, vector[:6])
+
+    def best_seam(self) -> tuple[Seam, float]:
+        """The seam that explains the distances best, and by how much (squared sigmas)."""
+        gains, heights = np.zeros(SECTORS), np.zeros(SECTORS)
+        for sector in range(SECTORS):
+            times = _sawtooth(sector)
+            curvature = float(times @ self._matrix @ times) + 1e-12
+            heights[sector] = -float(times @ self._vector) / curvature
+            gains[sector] = heights[sector] ** 2 * curvature
+        best = int(gains.argmax())
+        seam = Seam(2 * np.pi * best / SECTORS, 1 if heights[best] > 0 else -1)
+        return seam, float(gains[best])
+
+
+def _thinned(points: NDArray[np.float64], size_m: float) -> NDArray[np.float64]:
+    near = points[np.linalg.norm(points, axis=1) < MAX_RANGE_M]
+    return near[voxel.thin(near, size_m)]
+
+
+def _shift(twist: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How points (M, 3) move per unit of the twist (6,)."""
+    return np.cross(twist[:3], points) + twist[3:]
+
+
+def _basis(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """For points (M, 3): per sector of azimuth a constant and a slope (M, 48)."""
+    part = np.mod(np.arctan2(points[:, 1], points[:, 0]) / (2 * np.pi), 1.0) * SECTORS
+    sector = np.minimum(part.astype(np.int64), SECTORS - 1)
+    basis = np.zeros((len(points), 2 * SECTORS))
+    rows = np.arange(len(points))
+    basis[rows, 2 * sector] = 1.0
+    basis[rows, 2 * sector + 1] = part - sector - 0.5
+    return basis
+
+
+def _sawtooth(seam_sector: int) -> NDArray[np.float64]:
+    """Time (48,) of a counterclockwise sweep that starts at a sector's edge, in that basis."""
+    later = (np.arange(SECTORS) - seam_sector) % SECTORS
+    times = np.zeros(2 * SECTORS)
+    times[0::2] = (later + 0.5) / SECTORS - 0.5
+    times[1::2] = 1.0 / SECTORS
+    return times

@@ -1,0 +1,215 @@
+"""One frame after another onto the local map: predict, propose, verify, remember."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidaraccum.data.frame import BoolArray, Frame
+from lidaraccum.data.registered import RegisteredFrame, RegistrationQuality
+from lidaraccum.geometry import rigid
+from lidaraccum.registration.deskew import SweepClock
+from lidaraccum.registration.icp import assess
+from lidaraccum.registration.locate import Hypothesis, Located, proposed, refine, search
+from lidaraccum.registration.pace import Pace
+from lidaraccum.registration.proposals import Reach
+from lidaraccum.registration.quality import Judge
+from lidaraccum.registration.scan import Scan, prepare
+from lidaraccum.registration.settings import RegistrationSettings
+from lidaraccum.registration.surface_map import SurfaceMap
+
+MAX_ACCELERATION = 8.0
+"""m/s²: a step that differs from constant velocity by more is compared with its rivals."""
+
+SMOOTH_M = 0.2
+"""Metres added to that, for noise."""
+
+SAME_TWIST_M, SAME_TWIST_RAD = 0.02, 0.0005
+"""A frame is deskewed again when its motion turns out to differ by more from what was assumed."""
+
+MAX_PASSES = 3
+MAX_REACH_M = 60.0
+
+PATIENCE = 3
+"""Frames in a row that may be left out of the map as lost before the map starts anew."""
+
+
+@dataclass(frozen=True, eq=False)
+class Expectation:
+    """What is thought of a frame before its points are asked.
+
+    Attributes:
+        starts: Poses it may have, the likeliest first.
+        steps: Frame intervals since the last frame on the map.
+        known: Whether the likeliest rests on a motion that was measured.
+    """
+
+    starts: tuple[Hypothesis, ...]
+    steps: float
+    known: bool
+
+
+class Tracker:
+    """The local map, the last pose on it and the last motion."""
+
+    def __init__(
+        self,
+        settings: RegistrationSettings,
+        pace: Pace,
+        clock: SweepClock,
+        twist: NDArray[np.float64] | None = None,
+    ) -> None:
+        """Begin with an empty map.
+
+        Args:
+            settings: What registration may be told.
+            pace: Shared with whoever sees the stamps.
+            clock: How time runs within a sweep; may be replaced later.
+            twist: (6,) motion over one frame interval at the first frame, or None: unknown.
+        """
+        self.clock = clock
+        self.twist = twist
+        self._settings = settings
+        self._pace = pace
+        self._surface = SurfaceMap(settings.voxel_m, settings.max_range_m * 1.1)
+        self._judge = Judge(settings)
+        self._last: RegisteredFrame | None = None
+        self._first_origin = np.zeros(3)
+        self._lost = 0
+
+    def start(self, index: int, raw: Frame, usable: BoolArray, pose: rigid.Pose) -> RegisteredFrame:
+        """Put the first frame on the empty map."""
+        self._first_origin = raw.origin
+        scan = self._prepare(index, raw, usable, self.twist)
+        self._remember(scan, pose)
+        quality = RegistrationQuality("first", overlap=1.0, residual_m=0.0)
+        return RegisteredFrame(index, scan.frame, pose, quality, scan.deskewed)
+
+    def hold(self, index: int, raw: Frame, usable: BoolArray, pose: rigid.Pose) -> RegisteredFrame:
+        """Take a given pose as it is; only measure how well the map speaks for it."""
+        assert self._last is not None
+        steps = self._steps_to(index, raw)
+        self.twist = rigid.logarithm(rigid.invert(self._last.world_from_sensor) @ pose) / steps
+        scan = self._prepare(index, raw, usable, self.twist)
+        located = Located("given", assess(self._surface, scan.source, pose))
+        speed = self._speed(located, steps)
+        quality = self._judge.judge(located, speed)
+        self._remember(scan, pose)
+        return RegisteredFrame(index, scan.frame, pose, quality, scan.deskewed)
+
+    def follow(
+        self, index: int, raw: Frame, usable: BoolArray, hints: tuple[Hypothesis, ...] = ()
+    ) -> RegisteredFrame:
+        """Find the next frame's pose.
+
+        Args:
+            index: Place of the frame in the sequence.
+            raw: The frame as read.
+            usable: (N,) points that may be used.
+            hints: Poses from elsewhere, believed before constant velocity.
+        """
+        expectation = self._expect(index, raw, hints)
+        twist = self._twist_to(expectation.starts[0].world_from_sensor, expectation.steps)
+        scan = self._prepare(index, raw, usable, twist)
+        located = self._locate(scan, expectation)
+        for _ in range(MAX_PASSES - 1):
+            found = self._twist_to(located.alignment.world_from_sensor, expectation.steps)
+            if not scan.deskewed or _are_same(found, twist):
+                break
+            twist = found
+            scan = self._prepare(index, raw, usable, twist)
+            again = refine(self._surface, scan.source, _start_of(located))
+            located = replace(located, alignment=again.alignment)
+        return self._conclude(scan, located, expectation)
+
+    def _expect(self, index: int, raw: Frame, hints: tuple[Hypothesis, ...]) -> Expectation:
+        assert self._last is not None
+        steps = self._steps_to(index, raw)
+        last = self._last.world_from_sensor
+        starts = list(hints)
+        if raw.origin.any():
+            aligned = rigid.translation(raw.origin - self._first_origin)
+            starts.append(Hypothesis("aligned", aligned))
+        known = self.twist is not None or bool(starts)
+        if self.twist is not None:
+            moved_on = last @ rigid.exponential(self.twist * steps)
+            starts.append(Hypothesis("previous", moved_on))
+        starts.append(Hypothesis("still", last))
+        return Expectation(tuple(starts), steps, known)
+
+    def _locate(self, scan: Scan, expectation: Expectation) -> Located:
+        """The likeliest start if it holds; otherwise the best of all that can be thought of."""
+        first = expectation.starts[0]
+        if expectation.known:
+            found = refine(self._surface, scan.source, first)
+            if self._judge.trusts(found) and self._is_smooth(found, first, expectation.steps):
+                return found
+        interval_s = expectation.steps * self._pace.interval_s
+        reach = Reach(
+            min(self._settings.max_speed_mps * interval_s, MAX_REACH_M),
+            min(np.deg2rad(self._settings.max_turn_dps) * interval_s, np.pi),
+        )
+        # How the sensor is mounted is unknown until it has moved once.
+        axes = (2,) if expectation.known else (2, 0, 1)
+        shifts = proposed(self._surface, scan.source, first.world_from_sensor, reach, axes)
+        return search(self._surface, scan.source, [*expectation.starts, *shifts])
+
+    def _is_smooth(self, found: Located, start: Hypothesis, steps: float) -> bool:
+        interval_s = steps * self._pace.interval_s
+        away = found.alignment.world_from_sensor[:3, 3] - start.world_from_sensor[:3, 3]
+        return bool(np.linalg.norm(away) < SMOOTH_M + 0.5 * MAX_ACCELERATION * interval_s**2)
+
+    def _conclude(self, scan: Scan, located: Located, expectation: Expectation) -> RegisteredFrame:
+        """Believe the answer, or keep the expectation where nothing fits."""
+        lost = self._judge.is_lost(located)
+        quality = self._judge.judge(located, self._speed(located, expectation.steps))
+        pose = located.alignment.world_from_sensor
+        self._lost = self._lost + 1 if lost else 0
+        if lost:
+            pose = expectation.starts[0].world_from_sensor
+            quality = replace(quality, hypothesis=expectation.starts[0].name)
+        else:
+            self.twist = self._twist_to(pose, expectation.steps)
+        if self._lost > PATIENCE:
+            self._judge.forget()
+        if not lost or self._lost > PATIENCE:
+            self._remember(scan, pose)
+        return RegisteredFrame(scan.index, scan.frame, pose, quality, scan.deskewed)
+
+    def _remember(self, scan: Scan, pose: rigid.Pose) -> None:
+        self._surface.insert(rigid.transform(pose, scan.points), scan.index)
+        self._surface.forget_far(pose[:3, 3], scan.index)
+        # Of the frame only the stamp is needed: let go of its points.
+        stub = Frame(np.zeros((0, 3), np.float32), stamp=scan.raw.stamp)
+        quality = RegistrationQuality("", overlap=1.0, residual_m=0.0)
+        self._last = RegisteredFrame(scan.index, stub, pose, quality)
+
+    def _prepare(
+        self, index: int, raw: Frame, usable: BoolArray, twist: NDArray[np.float64] | None
+    ) -> Scan:
+        motion = (self.clock, np.zeros(6) if twist is None else twist, self._pace.interval_s)
+        return prepare(index, raw, usable, motion, self._settings.source_voxel_m)
+
+    def _steps_to(self, index: int, raw: Frame) -> float:
+        assert self._last is not None
+        missed = index - self._last.index
+        return self._pace.steps(self._last.frame.stamp, raw.stamp, missed)
+
+    def _twist_to(self, pose: rigid.Pose, steps: float) -> NDArray[np.float64]:
+        assert self._last is not None
+        return rigid.logarithm(rigid.invert(self._last.world_from_sensor) @ pose) / steps
+
+    def _speed(self, located: Located, steps: float) -> float:
+        twist = self._twist_to(located.alignment.world_from_sensor, steps)
+        return float(np.linalg.norm(twist[3:])) / self._pace.interval_s
+
+
+def _are_same(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    change = np.abs(one - other)
+    return bool(change[3:].max() < SAME_TWIST_M and change[:3].max() < SAME_TWIST_RAD)
+
+
+def _start_of(located: Located) -> Hypothesis:
+    return Hypothesis(located.hypothesis, located.alignment.world_from_sensor)
