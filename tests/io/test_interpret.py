@@ -125,6 +125,12 @@ def test_utm_survives_to_a_millimetre(cloud: Cloud) -> None:
     np.testing.assert_allclose(back, there, rtol=0, atol=1e-4)
 
 
+def test_no_return_is_known_among_georeferenced_points(cloud: Cloud) -> None:
+    there = cloud().astype(np.float64) + np.array([500_000.0, 5_400_000.0, 300.0])
+    there[:7] = 0.0
+    np.testing.assert_array_equal(np.flatnonzero(~frame_of(there).returned), np.arange(7))
+
+
 @pytest.mark.parametrize(
     ("factor", "unit"), [(1000.0, "millimetres"), (0.001, "kilometres")], ids=["mm", "km"]
 )

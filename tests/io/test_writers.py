@@ -18,6 +18,7 @@ from lidaraccum.data.accumulation import AccumulatedFrame
 from lidaraccum.errors import OutputError, OutputExistsError, SettingsError
 from lidaraccum.io.clouds import read_cloud
 from lidaraccum.io.columns import RawVlr
+from lidaraccum.io.sequences import open_sequence
 from lidaraccum.io.writers import SUFFIXES, WriterSettings, open_writer
 
 Make = Callable[..., AccumulatedFrame]
@@ -155,6 +156,56 @@ def test_las_writes_the_inputs_projection_records_back(tmp_path: Path, accumulat
     assert read_cloud(path).crs_wkt == WKT
 
 
+def test_geotiff_keys_are_written_back_when_there_is_no_wkt(
+    tmp_path: Path, accumulated: Make
+) -> None:
+    keys = np.array([1, 1, 0, 1, 3072, 0, 1, 25832], "<u2").tobytes()
+    record = RawVlr("LASF_Projection", 34735, "keys", keys)
+    header = laspy.read(write(tmp_path / "out.las", [accumulated()], vlrs=(record,))).header
+    [kept] = [vlr for vlr in header.vlrs if vlr.record_id == 34735]
+    assert kept.record_data_bytes() == keys
+    assert not header.global_encoding.wkt
+
+
+def test_las_to_las_loses_nothing(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.scales, header.offsets = [0.001] * 3, [500_000.0, 5_400_000.0, 0.0]
+    header.add_extra_dim(laspy.ExtraBytesParams("Amplitude", np.float32))
+    header.vlrs.append(laspy.VLR("LASF_Projection", 2112, "", WKT.encode() + b"\0"))
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = rng.uniform(-50, 50, (3, 300)) + np.array(UTM)[:, None]
+    las.intensity = rng.integers(0, 65536, 300)
+    las.gps_time = 123_456.0 + np.sort(rng.uniform(0, 0.1, 300))
+    las["Amplitude"] = rng.random(300)
+    (tmp_path / "in").mkdir()
+    las.write(tmp_path / "in" / "0.laz")
+    sequence = open_sequence(tmp_path / "in")
+    frame = sequence[0]
+    accumulated = AccumulatedFrame(
+        index=0,
+        points=frame.points.astype(np.float64) + frame.origin,
+        rows=np.arange(300),
+        row_count=300,
+        label=np.zeros(300, np.uint8),
+        instance=np.zeros(300, np.int32),
+        confidence=np.ones(300, np.float32),
+        time=frame.time_offset,
+        range_m=np.ones(300, np.float32),
+        stamp=frame.stamp,
+        reference_from_sensor=np.eye(4),
+        attributes={"intensity": frame.intensity, **frame.attributes},
+    )
+    crs = {"crs_wkt": sequence.crs_wkt, "vlrs": sequence.crs_vlrs}
+    back = laspy.read(write(tmp_path / "out.laz", [accumulated], **crs))
+    assert len(back.points) == 300
+    for axis in "xyz":
+        np.testing.assert_allclose(back[axis], las[axis], rtol=0, atol=1.01e-3)
+    for name in ("intensity", "gps_time", "Amplitude"):
+        np.testing.assert_array_equal(back[name], las[name])
+    assert back.header.vlrs.get("WktCoordinateSystemVlr")[0].string == WKT
+
+
 def test_las_keeps_its_own_dimensions_and_carries_ours_apart(
     tmp_path: Path, accumulated: Make
 ) -> None:
@@ -263,6 +314,7 @@ ENDLESS = """
 import sys
 import numpy as np
 from lidaraccum.data.accumulation import AccumulatedFrame
+from lidaraccum.io.sequences import open_sequence
 from lidaraccum.io.writers import open_writer
 n = 1000
 with open_writer(sys.argv[1]) as writer:

@@ -77,7 +77,7 @@ class Frame:
     def returned(self) -> BoolArray:
         """(N,) bool: False for "no return" points, which lie at the sensor's own place."""
         if self.origin.any():
-            return np.ones(len(self), dtype=np.bool_)
+            return np.any(np.abs(self.points + self.origin) >= NO_RETURN_RANGE_M, axis=1)
         away = np.abs(self.points) >= NO_RETURN_RANGE_M
         return away[:, 0] | away[:, 1] | away[:, 2]
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lidaraccum.errors import InputError
 from lidaraccum.io.columns import Columns
 from lidaraccum.io.formats import read_columns
+from lidaraccum.io.las import read_crs
 from lidaraccum.io.listing import format_of
 from lidaraccum.io.write_las import CLASSIFICATION
 
@@ -63,12 +64,14 @@ def read_cloud(path: Path | str) -> Cloud:
     """
     path = Path(path)
     columns = read_columns(path)
+    crs_wkt = None
     if not len(columns.xyz):
         raise InputError(f"{path} holds zero points")
     attributes = dict(columns.attributes)
     found: dict[str, NDArray[Any]] = {}
     if format_of(path) in ("las", "laz"):
         found, attributes = own_of_las(columns)
+        crs_wkt = read_crs(path)[0]
     for name in OWN_TYPES:
         if name in attributes:
             found.setdefault(name, attributes.pop(name))
@@ -83,7 +86,7 @@ def read_cloud(path: Path | str) -> Cloud:
         time=own["time"].astype(np.float64),
         attributes=attributes,
         own_fields=frozenset(found),
-        crs_wkt=columns.crs_wkt,
+        crs_wkt=crs_wkt,
     )
 
 

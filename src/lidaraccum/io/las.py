@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import struct
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,9 @@ from lidaraccum.io.columns import Columns, RawVlr, native, readable
 
 PROJECTION_USER = "LASF_Projection"
 WKT_RECORD, WKT_MATH_RECORD = 2112, 2111
-GEOTIFF_RECORDS = (34735, 34736, 34737)
+GEOTIFF_DIRECTORY = 34735
+logger = logging.getLogger(__name__)
+
 POSITION = ("X", "Y", "Z")
 
 
@@ -111,6 +114,16 @@ def wkt_of(vlrs: tuple[RawVlr, ...]) -> str | None:
     return None
 
 
+def wkt_of_keys(header: Any) -> str | None:
+    """GeoTIFF keys, which older files have, as WKT, where pyproj is installed."""
+    try:
+        crs = header.parse_crs()
+    except (ImportError, LaspyException, ValueError, RuntimeError) as error:
+        logger.warning("the GeoTIFF keys cannot be put into WKT: %s", error)
+        return None
+    return None if crs is None else str(crs.to_wkt("WKT1_GDAL"))
+
+
 def read_crs(path: Path) -> tuple[str | None, tuple[RawVlr, ...]]:
     """Only the coordinate system of a LAS file, its points unread."""
     check_header(path)
@@ -118,6 +131,8 @@ def read_crs(path: Path) -> tuple[str | None, tuple[RawVlr, ...]]:
         try:
             with laspy.open(path) as reader:
                 vlrs = projection_vlrs(reader.header)
+                has_keys = any(vlr.record_id == GEOTIFF_DIRECTORY for vlr in vlrs)
+                wkt = wkt_of(vlrs) or (wkt_of_keys(reader.header) if has_keys else None)
         except (LaspyException, ValueError, RuntimeError, struct.error) as error:
             raise unreadable(path, error) from error
-    return wkt_of(vlrs), vlrs
+    return wkt, vlrs

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from lidaraccum.errors import InputError, MissingInputError
 from lidaraccum.io.columns import readable
 from lidaraccum.io.listing import (
+    FORMATS,
     GLOB_MARKS,
     LIST_SUFFIXES,
     checked_paths,
@@ -76,6 +77,8 @@ def find_layout(source: Source, wanted: str | None = None) -> Layout:
         InputError: Formats are mixed, or a file beside the frames cannot be read.
     """
     layout = recognise(source)
+    if not layout.frames:
+        raise nothing_found(source)
     frames, form = of_one_format(layout.frames, wanted, str(source))
     if layout.stamps is not None and len(frames) != len(layout.frames):
         kept = [layout.frames.index(path) for path in frames]
@@ -86,6 +89,17 @@ def find_layout(source: Source, wanted: str | None = None) -> Layout:
         if stamps is not None:
             layout = replace(layout, stamps=stamps, stamps_from="the frames' names")
     return checked(layout)
+
+
+def nothing_found(source: Source) -> MissingInputError:
+    """The error for a source without frames; it names folders inside that hold some."""
+    hint = f"looked for {', '.join(sorted(FORMATS))} files"
+    if isinstance(source, str | Path) and Path(source).is_dir():
+        folders = sorted(path for path in Path(source).iterdir() if path.is_dir())
+        full = [path.name for path in folders[:100] if layout_of_folder(path).frames]
+        if full:
+            hint = f"its folder {full[0]} holds frames"
+    return MissingInputError(f"{source} holds no frame", hint=hint)
 
 
 def recognise(source: Source) -> Layout:
@@ -164,16 +178,20 @@ def kitti_odometry_layout(folder: Path) -> Layout:
     times = first_file(folder, "times.txt")
     labels = folder / "labels"
     has_labels = labels.is_dir() and any(labels.glob("*.label"))
+    poses = first_file(folder, "poses.txt", f"../../poses/{name}.txt")
+    calibration = first_file(folder, "calib.txt")
+    said = f"{poses.name if poses else ''} is taken to hold poses of the sensor: no calib.txt"
     return Layout(
         "SemanticKITTI sequence" if has_labels else "KITTI odometry sequence",
         name,
         frames_in(folder / "velodyne"),
         stamps=read_times(times) if times else None,
         stamps_from="times.txt" if times else "",
-        poses_file=first_file(folder, "poses.txt", f"../../poses/{name}.txt"),
-        calibration=first_file(folder, "calib.txt"),
+        poses_file=poses,
+        calibration=calibration,
         labels=labels if has_labels else None,
         label_kind=SEMANTIC_KITTI_LABELS if has_labels else "",
+        warnings=(said,) if poses and not calibration else (),
     )
 
 

@@ -78,7 +78,7 @@ def of_one_format(
 
     Raises:
         InputError: Formats are mixed and none was chosen.
-        MissingInputError: None is left.
+        MissingInputError: None is of the wanted format.
         SettingsError: The wanted format is unknown.
     """
     if wanted is not None and wanted not in FORMATS:
@@ -89,10 +89,6 @@ def of_one_format(
         if not kept:
             raise MissingInputError(f"{place} holds no {wanted} file")
         return kept, wanted
-    if not counts:
-        raise MissingInputError(
-            f"{place} holds no frame", hint=f"looked for {', '.join(sorted(FORMATS))} files"
-        )
     if len(counts) > 1:
         said = ", ".join(f"{count} {form}" for form, count in sorted(counts.items()))
         raise InputError(f"{place} mixes formats: {said}", hint="choose one with --format")

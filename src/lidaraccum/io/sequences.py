@@ -3,110 +3,28 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.data.frame import Box, Frame, Labels
-from lidaraccum.errors import InputError, MissingInputError, SettingsError
-from lidaraccum.io.bin import check_size, default_fields
+from lidaraccum.errors import InputError, MissingInputError
 from lidaraccum.io.columns import Columns, RawVlr
-from lidaraccum.io.formats import read_columns
+from lidaraccum.io.frame_source import FrameSource, check_bin_files, frame_source
 from lidaraccum.io.interpret import Occasion, frame_from_columns
+from lidaraccum.io.layout_poses import sensor_poses
 from lidaraccum.io.layouts import NPZ_LABELS, Layout, Source, find_layout
-from lidaraccum.io.poses import camera_calibration, match_stamps, read_poses, velodyne_poses
+from lidaraccum.io.sequence_info import ReadCounts, SequenceInfo
 from lidaraccum.io.settings import AUTO_POSES, InputSettings, selection
-from lidaraccum.io.timing import DEFAULT_RATE_HZ, Timing, find_timing
+from lidaraccum.io.timing import Timing, find_timing
 from lidaraccum.io.truth import label_fields, read_boxes, read_truth, rows_of_labels
 
 __all__ = ["FileSequence", "InputSettings", "ReadCounts", "SequenceInfo", "open_sequence"]
 
 logger = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class SequenceInfo:
-    """What was found, for people and reports.
-
-    Attributes:
-        source: As the user named it.
-        layout: What it was recognised as, in words.
-        format: Of the frames.
-        frames: How many, after ``--frames``.
-        files: The frames' files, in order; one file when it holds many frames.
-        rate_hz: Frames a second.
-        rate_from: Where the rate comes from, in words.
-        times_from: Where the stamps come from, in words.
-        poses_file: Poses found beside the frames, or None.
-        poses_used: Where the poses in use come from, in words.
-        labels: What truth was found, in words; empty for none.
-        crs_wkt: Coordinate reference system, or None.
-        warnings: What looks odd, in words.
-    """
-
-    source: str
-    layout: str
-    format: str
-    frames: int
-    files: tuple[Path, ...]
-    rate_hz: float
-    rate_from: str
-    times_from: str
-    poses_file: Path | None
-    poses_used: str
-    labels: str
-    crs_wkt: str | None
-    warnings: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class ReadCounts:
-    """Points of the frames read so far, each frame counted once.
-
-    Attributes:
-        points: In the files.
-        dropped: Not finite, left out.
-        no_return: At the sensor's own place, kept.
-    """
-
-    points: int = 0
-    dropped: int = 0
-    no_return: int = 0
-
-
-class FrameSource(Protocol):
-    """Where the columns of each frame come from."""
-
-    def __len__(self) -> int: ...
-
-    def label(self, index: int) -> str:
-        """What frame ``index`` is called in messages."""
-
-    def columns(self, index: int) -> Columns:
-        """Frame ``index``, read anew."""
-
-
-class FilePerFrame:
-    """One file a frame."""
-
-    def __init__(self, files: tuple[Path, ...], bin_fields: tuple[str, ...]) -> None:
-        self._files = files
-        self._bin_fields = bin_fields
-
-    def __len__(self) -> int:
-        return len(self._files)
-
-    def label(self, index: int) -> str:
-        """The file's name."""
-        return self._files[index].name
-
-    def columns(self, index: int) -> Columns:
-        """The file's content."""
-        return read_columns(self._files[index], self._bin_fields)
 
 
 def open_sequence(source: Source, settings: InputSettings | None = None) -> FileSequence:
@@ -126,28 +44,6 @@ def open_sequence(source: Source, settings: InputSettings | None = None) -> File
         settings = replace(settings, bin_fields=layout.bin_fields)
     check_bin_files(layout, settings)
     return FileSequence(str(source), layout, settings, frame_source(layout, settings))
-
-
-def frame_source(layout: Layout, settings: InputSettings) -> FrameSource:
-    """One file a frame, or one LAS file split."""
-    if settings.split_by is None:
-        return FilePerFrame(layout.frames, settings.bin_fields)
-    if len(layout.frames) != 1 or layout.format not in ("las", "laz"):
-        raise SettingsError(
-            f"--split-by needs one LAS or LAZ file, not {len(layout.frames)} {layout.format} files"
-        )
-    from lidaraccum.io.split import SplitLas
-
-    rate_hz = settings.rate_hz or layout.rate_hz or DEFAULT_RATE_HZ
-    return SplitLas(layout.frames[0], settings.split_by, 1.0 / rate_hz)
-
-
-def check_bin_files(layout: Layout, settings: InputSettings) -> None:
-    """Raise InputError for headerless files whose size no record fits, before any is read."""
-    if layout.format in ("bin", "pcd.bin"):
-        for path in layout.frames:
-            names = settings.bin_fields or default_fields(path)
-            check_size(path, path.stat().st_size, names, given=bool(settings.bin_fields))
 
 
 class FileSequence:
@@ -300,26 +196,11 @@ class FileSequence:
 
     @cached_property
     def _timing(self) -> Timing:
-        return find_timing(self._layout, self._settings, self._clock_steps)
+        return find_timing(self._layout, self._settings, self._frames)
 
     @property
     def _period_s(self) -> float:
         return self._timing.period_s
-
-    def _clock_steps(self) -> float | None:
-        """Seconds between the first two frames by the points' own clock, or None."""
-        if self._layout.format in ("bin", "pcd.bin") and not self._settings.bin_fields:
-            return None
-        period_s = 1.0 / (self._layout.rate_hz or DEFAULT_RATE_HZ)
-        stamps = []
-        for place in range(min(2, len(self._frames))):
-            columns = self._frames.columns(place)
-            occasion = Occasion(self._frames.label(place), -1e12, period_s)
-            stamp = frame_from_columns(columns, occasion).stamp
-            if stamp == occasion.stamp:
-                return None
-            stamps.append(stamp)
-        return stamps[1] - stamps[0] if len(stamps) == 2 else None
 
     def _occasion(self, place: int, period_s: float) -> Occasion:
         stamps = self._timing.stamps
@@ -396,18 +277,7 @@ class FileSequence:
         return poses
 
     def _sensor_poses(self, path: Path) -> NDArray[np.float64]:
-        """Poses (T, 4, 4) of a file; KITTI's own are the camera's and are moved to the sensor."""
-        trajectory = read_poses(path)
-        stamps = self._timing.stamps
-        if trajectory.stamps is not None and len(trajectory) != len(self._frames):
-            if stamps is None:
-                stamps = self._period_s * np.arange(len(self._frames), dtype=np.float64)
-            return match_stamps(trajectory, stamps, self._period_s / 2, path)
-        poses, found = trajectory.world_from_sensor, self._layout.poses_file
-        is_own = found is not None and found.resolve() == path.resolve()
-        if is_own and self._layout.calibration is not None:
-            return velodyne_poses(poses, camera_calibration(self._layout.calibration))
-        return poses
+        return sensor_poses(path, self._layout, self._timing, len(self._frames))
 
     def _poses_of(self, path: Path) -> NDArray[np.float64]:
         """Poses (T, 4, 4) of the chosen frames."""

@@ -8,6 +8,7 @@ from lidaraccum.errors import SettingsError
 from lidaraccum.io.listing import FORMATS
 
 AUTO_POSES = "auto"
+DEFAULT_RATE_HZ = 10.0
 
 
 @dataclass(frozen=True)
