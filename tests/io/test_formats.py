@@ -176,11 +176,13 @@ def test_npy_plain_and_structured(tmp_path: Path, cloud: Cloud) -> None:
 
 
 def test_npz_with_named_arrays(tmp_path: Path, cloud: Cloud) -> None:
-    np.savez(tmp_path / "a.npz", points=cloud(), ring=np.arange(200), pose=np.eye(4))
+    rgb = np.arange(600).reshape(200, 3)
+    np.savez(tmp_path / "a.npz", points=cloud(), ring=np.arange(200), pose=np.eye(4), rgb=rgb)
     columns = read_npz(tmp_path / "a.npz")
+    np.testing.assert_array_equal(columns.attributes["rgb_1"], rgb[:, 1])
     np.testing.assert_array_equal(columns.xyz, cloud())
-    assert list(columns.attributes) == ["ring"]
-    assert "array pose" in columns.warnings[0]
+    assert list(columns.attributes) == ["ring", "rgb_0", "rgb_1", "rgb_2"]
+    assert "pose of shape (4, 4)" in columns.warnings[0]
 
 
 def test_a_truncated_npy_or_npz_is_refused(tmp_path: Path, cloud: Cloud) -> None:

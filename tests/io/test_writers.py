@@ -12,6 +12,7 @@ from pathlib import Path
 import laspy
 import numpy as np
 import pytest
+from laspy.header import GpsTimeType
 from plyfile import PlyData
 
 from lidaraccum.data.accumulation import AccumulatedFrame
@@ -171,6 +172,7 @@ def test_las_to_las_loses_nothing(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     header = laspy.LasHeader(version="1.4", point_format=6)
     header.scales, header.offsets = [0.001] * 3, [500_000.0, 5_400_000.0, 0.0]
+    header.global_encoding.gps_time_type = GpsTimeType.STANDARD
     header.add_extra_dim(laspy.ExtraBytesParams("Amplitude", np.float32))
     header.vlrs.append(laspy.VLR("LASF_Projection", 2112, "", WKT.encode() + b"\0"))
     las = laspy.LasData(header)
@@ -196,14 +198,21 @@ def test_las_to_las_loses_nothing(tmp_path: Path) -> None:
         reference_from_sensor=np.eye(4),
         attributes={"intensity": frame.intensity, **frame.attributes},
     )
-    crs = {"crs_wkt": sequence.crs_wkt, "vlrs": sequence.crs_vlrs}
-    back = laspy.read(write(tmp_path / "out.laz", [accumulated], **crs))
+    path = write(
+        tmp_path / "out.laz",
+        [accumulated],
+        crs_wkt=sequence.crs_wkt,
+        vlrs=sequence.crs_vlrs,
+        standard_gps_time=sequence.las_reference.standard_gps_time,
+    )
+    back = laspy.read(path)
     assert len(back.points) == 300
     for axis in "xyz":
-        np.testing.assert_allclose(back[axis], las[axis], rtol=0, atol=1.01e-3)
+        np.testing.assert_allclose(back[axis], las[axis], rtol=0, atol=1e-6)
     for name in ("intensity", "gps_time", "Amplitude"):
         np.testing.assert_array_equal(back[name], las[name])
     assert back.header.vlrs.get("WktCoordinateSystemVlr")[0].string == WKT
+    assert back.header.global_encoding.gps_time_type == GpsTimeType.STANDARD
 
 
 def test_las_keeps_its_own_dimensions_and_carries_ours_apart(

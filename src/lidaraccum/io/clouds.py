@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lidaraccum.errors import InputError
 from lidaraccum.io.columns import Columns
 from lidaraccum.io.formats import read_columns
-from lidaraccum.io.las import read_crs
+from lidaraccum.io.las import read_reference
 from lidaraccum.io.listing import format_of
 from lidaraccum.io.write_las import CLASSIFICATION
 
@@ -71,7 +71,7 @@ def read_cloud(path: Path | str) -> Cloud:
     found: dict[str, NDArray[Any]] = {}
     if format_of(path) in ("las", "laz"):
         found, attributes = own_of_las(columns)
-        crs_wkt = read_crs(path)[0]
+        crs_wkt = read_reference(path).crs_wkt
     for name in OWN_TYPES:
         if name in attributes:
             found.setdefault(name, attributes.pop(name))

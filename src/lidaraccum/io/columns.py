@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 
 from lidaraccum.errors import InputError, MissingInputError
 
+WIDEST = 16
+"""An array of more columns than this is no attribute of the points but something else."""
+
 
 @dataclass(frozen=True)
 class RawVlr:
@@ -29,6 +32,21 @@ class RawVlr:
     record_id: int
     description: str
     data: bytes
+
+
+@dataclass(frozen=True)
+class LasReference:
+    """What coordinates and times of a LAS file refer to.
+
+    Attributes:
+        crs_wkt: Coordinate reference system as WKT, or None.
+        vlrs: The records that say so, as they are.
+        standard_gps_time: ``gps_time`` is GPS time less 1e9 s; otherwise seconds of the week.
+    """
+
+    crs_wkt: str | None = None
+    vlrs: tuple[RawVlr, ...] = ()
+    standard_gps_time: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +101,36 @@ def columns_of_names(path: Path, by_name: Mapping[str, NDArray[Any]]) -> Columns
     for column, name in enumerate(position):
         xyz[:, column] = by_name[name]
     others = {name: values for name, values in by_name.items() if name not in position}
-    return Columns(xyz, others)
+    return Columns(xyz, flat(others, len(xyz)), warnings=left_out(path, others, len(xyz)))
+
+
+def flat(by_name: Mapping[str, NDArray[Any]], count: int) -> dict[str, NDArray[Any]]:
+    """Numeric columns (count,) by name; one of (count, k) becomes ``name_0`` to ``name_k-1``."""
+    columns: dict[str, NDArray[Any]] = {}
+    for name, values in by_name.items():
+        if not is_carried(values, count):
+            continue
+        if values.ndim == 1:
+            columns[name] = values
+        else:
+            columns |= {f"{name}_{i}": native(values[:, i]) for i in range(values.shape[1])}
+    return columns
+
+
+def left_out(path: Path, by_name: Mapping[str, NDArray[Any]], count: int) -> tuple[str, ...]:
+    """The columns that have no place in a frame, in words."""
+    return tuple(
+        f"{path.name}: {name} of shape {values.shape} {values.dtype} is left out"
+        for name, values in by_name.items()
+        if not is_carried(values, count)
+    )
+
+
+def is_carried(values: NDArray[Any], count: int) -> bool:
+    """Whether an array is a column of numbers, or a few of them side by side."""
+    if values.dtype.kind not in "biuf" or values.shape[:1] != (count,):
+        return False
+    return values.ndim == 1 or (values.ndim == 2 and values.shape[1] <= WIDEST)
 
 
 def native(values: NDArray[Any]) -> NDArray[Any]:

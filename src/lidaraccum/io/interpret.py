@@ -56,10 +56,10 @@ def frame_from_columns(columns: Columns, occasion: Occasion) -> Frame:
         InputError: No point, no point that came back, or a median range that no LiDAR in metres
             measures.
     """
-    finite = np.isfinite(columns.xyz).all(axis=1)
-    rows = None if finite.all() else np.flatnonzero(finite).astype(np.int64)
+    rows = finite_rows(columns.xyz)
     xyz = columns.xyz if rows is None else columns.xyz[rows]
-    returned = np.any(np.abs(xyz) >= NO_RETURN_RANGE_M, axis=1)
+    x, y, z = np.abs(xyz.T) >= NO_RETURN_RANGE_M
+    returned = x | y | z
     check_any(columns, xyz, returned, occasion.name)
     origin = origin_of(xyz if returned.all() else xyz[returned], occasion.name)
     points = (xyz - origin if origin.any() else xyz).astype(np.float32, copy=False)
@@ -78,6 +78,14 @@ def frame_from_columns(columns: Columns, occasion: Occasion) -> Frame:
         rows=rows,
         row_count=len(columns.xyz),
     )
+
+
+def finite_rows(xyz: NDArray[Any]) -> NDArray[np.int64] | None:
+    """Rows (M,) of the points (N, 3) that are finite, or None when all are."""
+    finite = np.isfinite(xyz)
+    if finite.all():
+        return None
+    return np.flatnonzero(finite.all(axis=1)).astype(np.int64)
 
 
 def check_any(columns: Columns, xyz: NDArray[Any], returned: BoolArray, name: str) -> None:

@@ -14,6 +14,7 @@ from lidaraccum.data.frame import Box, Frame, Labels
 from lidaraccum.data.sequence import LabelledSequence
 from lidaraccum.errors import SettingsError
 from lidaraccum.io.atomic import atomic, write_json, write_text
+from lidaraccum.io.columns import LasReference
 from lidaraccum.io.point_time import find_time
 from lidaraccum.io.poses import kitti_text
 
@@ -156,7 +157,7 @@ def write_las_frame(path: Path, frame: Frame, columns: Mapping[str, NDArray[Any]
     time = np.zeros(len(frame)) if frame.time_offset is None else frame.time_offset
     chunk = Chunk(frame.points.astype(np.float64) + frame.origin, {"time": time}, dict(columns))
     schema = Schema({name: values.dtype for name, values in columns.items()}, frame.stamp)
-    target = LasTarget(path, path.suffix == ".laz", None, (), own_fields=False)
+    target = LasTarget(path, path.suffix == ".laz", LasReference(), own_fields=False)
     encoder = LasEncoder(target, chunk, schema)
     encoder.write(chunk)
     encoder.finish()

@@ -10,10 +10,10 @@ from typing import Any
 import laspy
 import numpy as np
 from laspy.errors import LaspyException
-from numpy.typing import NDArray
+from laspy.header import GpsTimeType
 
 from lidaraccum.errors import InputError
-from lidaraccum.io.columns import Columns, RawVlr, native, readable
+from lidaraccum.io.columns import Columns, LasReference, RawVlr, flat, native, readable
 
 PROJECTION_USER = "LASF_Projection"
 WKT_RECORD, WKT_MATH_RECORD = 2112, 2111
@@ -49,13 +49,7 @@ def columns_of_points(points: Any, header: Any) -> Columns:
         xyz[:, column] = points[axis]
     names = [n for n in points.point_format.dimension_names if n not in POSITION]
     extra = set(points.point_format.extra_dimension_names)
-    attributes: dict[str, NDArray[Any]] = {}
-    for name in names:
-        values = native(np.asarray(points[name]))
-        if values.ndim == 1:
-            attributes[name] = values
-        else:
-            attributes |= {f"{name}_{i}": native(values[:, i]) for i in range(values.shape[1])}
+    attributes = flat({name: native(np.asarray(points[name])) for name in names}, len(xyz))
     vlrs = projection_vlrs(header)
     standard = frozenset(names) - extra - {"intensity"}
     return Columns(xyz, attributes, wkt_of(vlrs), vlrs, standard)
@@ -124,15 +118,17 @@ def wkt_of_keys(header: Any) -> str | None:
     return None if crs is None else str(crs.to_wkt("WKT1_GDAL"))
 
 
-def read_crs(path: Path) -> tuple[str | None, tuple[RawVlr, ...]]:
-    """Only the coordinate system of a LAS file, its points unread."""
+def read_reference(path: Path) -> LasReference:
+    """What a LAS file says about its coordinates and times, its points unread."""
     check_header(path)
     with readable(path):
         try:
             with laspy.open(path) as reader:
-                vlrs = projection_vlrs(reader.header)
+                header = reader.header
+                vlrs = projection_vlrs(header)
                 has_keys = any(vlr.record_id == GEOTIFF_DIRECTORY for vlr in vlrs)
-                wkt = wkt_of(vlrs) or (wkt_of_keys(reader.header) if has_keys else None)
+                wkt = wkt_of(vlrs) or (wkt_of_keys(header) if has_keys else None)
+                is_standard = header.global_encoding.gps_time_type == GpsTimeType.STANDARD
         except (LaspyException, ValueError, RuntimeError, struct.error) as error:
             raise unreadable(path, error) from error
-    return wkt, vlrs
+    return LasReference(wkt, vlrs, is_standard)

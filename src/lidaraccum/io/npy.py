@@ -13,7 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.errors import InputError
-from lidaraccum.io.columns import Columns, columns_of_names, columns_of_record, native, readable
+from lidaraccum.io.columns import (
+    Columns,
+    columns_of_names,
+    columns_of_record,
+    flat,
+    left_out,
+    native,
+    readable,
+)
 
 POINT_KEYS = ("points", "xyz", "positions")
 COLUMN_NAMES = ("x", "y", "z", "intensity", "ring")
@@ -46,13 +54,9 @@ def read_npz(path: Path) -> Columns:
     if key is None:
         return columns_of_names(path, arrays)
     points = columns_of_array(path, arrays.pop(key))
-    others = {n: native(a) for n, a in arrays.items() if a.shape == (len(points.xyz),)}
-    said = tuple(
-        f"{path.name}: array {name} of shape {array.shape} is left out"
-        for name, array in arrays.items()
-        if name not in others
-    )
-    return Columns(points.xyz, {**points.attributes, **others}, warnings=said)
+    count = len(points.xyz)
+    attributes = {**points.attributes, **flat(arrays, count)}
+    return Columns(points.xyz, attributes, warnings=left_out(path, arrays, count))
 
 
 def arrays_of_npz(path: Path) -> dict[str, NDArray[Any]]:

@@ -189,7 +189,7 @@ def names_of(header: PcdHeader) -> tuple[str, ...]:
 
 
 def scalar_columns(table: NDArray[Any]) -> dict[str, NDArray[Any]]:
-    """Columns (N,) by name; a field of COUNT > 1 becomes several, padding none.
+    """Columns (N,) by name, or (N, COUNT); padding is none.
 
     PCL packs colours into a float's bits; they are carried as the integer that they are.
     """
@@ -198,9 +198,7 @@ def scalar_columns(table: NDArray[Any]) -> dict[str, NDArray[Any]]:
         values = native(table[name])
         if name.startswith(PADDING) and name[1:].isdigit():
             continue
-        if values.ndim == 2:
-            by_name |= {f"{name}_{i}": native(values[:, i]) for i in range(values.shape[1])}
-        elif name in COLOUR and values.dtype == np.float32:
+        if name in COLOUR and values.dtype == np.float32:
             by_name[name] = values.view(np.uint32)
         else:
             by_name[name] = values

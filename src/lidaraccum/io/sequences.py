@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lidaraccum.data.frame import Box, Frame, Labels
 from lidaraccum.errors import InputError, MissingInputError
-from lidaraccum.io.columns import Columns, RawVlr
+from lidaraccum.io.columns import Columns, LasReference, RawVlr
 from lidaraccum.io.frame_source import FrameSource, check_bin_files, frame_source
 from lidaraccum.io.interpret import Occasion, frame_from_columns
 from lidaraccum.io.layout_poses import sensor_poses
@@ -97,12 +97,21 @@ class FileSequence:
     @property
     def crs_wkt(self) -> str | None:
         """Coordinate reference system of the first frame as WKT, or None."""
-        return self._crs[0]
+        return self.las_reference.crs_wkt
 
     @property
     def crs_vlrs(self) -> tuple[RawVlr, ...]:
         """The first LAS file's records about its coordinate system, to be written back."""
-        return self._crs[1]
+        return self.las_reference.vlrs
+
+    @cached_property
+    def las_reference(self) -> LasReference:
+        """What the first LAS file's coordinates and times refer to, to be written back."""
+        if self._layout.format not in ("las", "laz"):
+            return LasReference()
+        from lidaraccum.io.las import read_reference
+
+        return read_reference(self._layout.frames[0])
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -250,14 +259,6 @@ class FileSequence:
     def _stem(self, place: int) -> str:
         name = self._layout.frames[place].name
         return name[: -len(self._layout.format) - 1]
-
-    @cached_property
-    def _crs(self) -> tuple[str | None, tuple[RawVlr, ...]]:
-        if self._layout.format not in ("las", "laz"):
-            return None, ()
-        from lidaraccum.io.las import read_crs
-
-        return read_crs(self._layout.frames[0])
 
     @cached_property
     def _boxes(self) -> dict[int, tuple[Box, ...]]:

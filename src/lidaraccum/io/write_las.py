@@ -8,10 +8,11 @@ from typing import Any
 
 import laspy
 import numpy as np
+from laspy.header import GpsTimeType
 from numpy.typing import NDArray
 
 from lidaraccum.io.cloud_schema import Chunk, Schema, file_name_of
-from lidaraccum.io.columns import RawVlr
+from lidaraccum.io.columns import LasReference, RawVlr
 from lidaraccum.io.las import PROJECTION_USER, WKT_RECORD
 
 SCALE_M = 0.001
@@ -37,15 +38,13 @@ class LasTarget:
     Attributes:
         path: The file.
         compress: LAZ.
-        crs_wkt: The coordinate system as WKT, or None.
-        vlrs: An input's records about it.
+        reference: What coordinates and times refer to.
         own_fields: Write frame, label, instance, confidence; False for a sensor's own frame.
     """
 
     path: Path
     compress: bool
-    crs_wkt: str | None
-    vlrs: tuple[RawVlr, ...]
+    reference: LasReference
     own_fields: bool = True
 
 
@@ -71,7 +70,7 @@ class LasEncoder:
                 *(laspy.ExtraBytesParams(own, kind) for own, kind in extra.values()),
             ]
         )
-        add_crs(self._header, target.crs_wkt, target.vlrs)
+        add_reference(self._header, target.reference)
         self._file = target.path.open("w+b")
         self._writer = laspy.LasWriter(
             self._file, self._header, do_compress=target.compress, closefd=True
@@ -177,11 +176,14 @@ def free_name(name: str, taken: set[str]) -> str:
     raise AssertionError("a thousand attributes share their first 32 bytes")
 
 
-def add_crs(header: Any, crs_wkt: str | None, vlrs: tuple[RawVlr, ...]) -> None:
+def add_reference(header: Any, reference: LasReference) -> None:
     """The input's own records, or one made of the WKT; format 6 wants WKT where there is any."""
+    crs_wkt, vlrs = reference.crs_wkt, reference.vlrs
     kept = [vlr for vlr in vlrs if vlr.record_id == WKT_RECORD] or list(vlrs)
     if crs_wkt and not any(vlr.record_id == WKT_RECORD for vlr in kept):
         kept = [RawVlr(PROJECTION_USER, WKT_RECORD, "WKT", crs_wkt.encode() + b"\0")]
     for vlr in kept:
         header.vlrs.append(laspy.VLR(vlr.user_id, vlr.record_id, vlr.description, vlr.data))
     header.global_encoding.wkt = any(vlr.record_id == WKT_RECORD for vlr in kept)
+    if reference.standard_gps_time:
+        header.global_encoding.gps_time_type = GpsTimeType.STANDARD

@@ -11,7 +11,7 @@ from lidaraccum.data.accumulation import AccumulatedFrame
 from lidaraccum.errors import OutputError, SettingsError
 from lidaraccum.io.atomic import prepare, put_in_place, remove, writable
 from lidaraccum.io.cloud_schema import Chunk, Schema
-from lidaraccum.io.columns import RawVlr
+from lidaraccum.io.columns import LasReference, RawVlr
 
 SUFFIXES = (".ply", ".las", ".laz", ".pcd", ".npz")
 
@@ -25,12 +25,14 @@ class WriterSettings:
         crs_wkt: Coordinate reference system of the positions, for LAS.
         vlrs: A LAS input's records about it, written back as they came.
         time_origin: Seconds that ``time`` counts from; None for the first frame's stamp.
+        standard_gps_time: A LAS input's ``gps_time`` is GPS time less 1e9 s, not of the week.
     """
 
     overwrite: bool = False
     crs_wkt: str | None = None
     vlrs: tuple[RawVlr, ...] = ()
     time_origin: float | None = None
+    standard_gps_time: bool = False
 
 
 class Encoder(Protocol):
@@ -125,8 +127,10 @@ class CloudWriter:
             return NpzEncoder(self._temporary, chunk)
         from lidaraccum.io.write_las import LasEncoder, LasTarget
 
-        crs = self._settings.crs_wkt, self._settings.vlrs
-        return LasEncoder(LasTarget(self._temporary, suffix == ".laz", *crs), chunk, schema)
+        said = self._settings
+        reference = LasReference(said.crs_wkt, said.vlrs, said.standard_gps_time)
+        target = LasTarget(self._temporary, suffix == ".laz", reference)
+        return LasEncoder(target, chunk, schema)
 
     def __enter__(self) -> CloudWriter:
         return self
