@@ -9,10 +9,20 @@ MOMENTS = 10
 """Columns of moments: count, x, y, z, xx, xy, xz, yy, yz, zz (sums over the points)."""
 
 
-def point_moments(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Moments (N, 10) of single points (N, 3), about the origin: add them up over a group."""
-    x, y, z = points.T
-    return np.stack([np.ones_like(x), x, y, z, x * x, x * y, x * z, y * y, y * z, z * z], axis=1)
+def summed_moments(points: NDArray[np.float64], starts: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Moments (V, 10) of groups of points (N, 3), about the origin.
+
+    Args:
+        points: (N, 3), group after group.
+        starts: (V,) row at which each group begins.
+    """
+    x, y, z = np.ascontiguousarray(points.T)
+    moments = np.empty((len(starts), MOMENTS))
+    moments[:, 0] = np.diff(np.append(starts, len(points)))
+    columns = (x, y, z, x * x, x * y, x * z, y * y, y * z, z * z)
+    for column, values in enumerate(columns, start=1):
+        moments[:, column] = np.add.reduceat(values, starts)
+    return moments
 
 
 def shift_moments(moments: NDArray[np.float64], shift: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -56,11 +66,23 @@ def plane_normals(
     angle = np.arccos(np.clip(determinant / (2 * spread**3), -1, 1)) / 3
     largest = centre + 2 * spread * np.cos(angle)
     smallest = centre + 2 * spread * np.cos(angle + 2 * np.pi / 3)
-    rows = np.stack([xx - smallest, xy, xz, yy - smallest, yz, zz - smallest], axis=1)
-    r0, r1, r2 = rows[:, [0, 1, 2]], rows[:, [1, 3, 4]], rows[:, [2, 4, 5]]
-    crossed = np.stack([np.cross(r0, r1), np.cross(r0, r2), np.cross(r1, r2)], axis=1)
-    length = np.linalg.norm(crossed, axis=2)
-    best = length.argmax(axis=1)
-    every = np.arange(len(best))
-    normal = crossed[every, best] / (length[every, best] + 1e-30)[:, None]
+    normal = _null_direction((xx - smallest, xy, xz, yy - smallest, yz, zz - smallest))
     return normal, np.stack([smallest, 3 * centre - smallest - largest, largest], axis=1)
+
+
+def _null_direction(
+    entries: tuple[NDArray[np.float64], ...],
+) -> NDArray[np.float64]:
+    """Unit vectors (V, 3) that singular symmetric matrices take to zero.
+
+    The longest of the cross products of two rows.
+    """
+    xx, xy, xz, yy, yz, zz = entries
+    crossed = np.empty((3, 3, len(xx)))
+    crossed[0] = xy * yz - xz * yy, xz * xy - xx * yz, xx * yy - xy * xy
+    crossed[1] = xy * zz - xz * yz, xz * xz - xx * zz, xx * yz - xy * xz
+    crossed[2] = yy * zz - yz * yz, yz * xz - xy * zz, xy * yz - yy * xz
+    length = (crossed**2).sum(axis=1)
+    best = length.argmax(axis=0)
+    every = np.arange(len(xx))
+    return crossed[best, :, every] / (np.sqrt(length[best, every]) + 1e-30)[:, None]

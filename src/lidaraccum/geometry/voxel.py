@@ -36,7 +36,7 @@ def cell_keys(cells: NDArray[np.int64]) -> Keys:
 
 def voxel_centres(keys: Keys, size_m: float) -> NDArray[np.float64]:
     """Centres (N, 3) of the voxels, metres."""
-    return (voxel_cells(keys) + 0.5) * size_m
+    return (voxel_cells(keys).astype(np.float64) + 0.5) * size_m
 
 
 def group_by_key(keys: Keys) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

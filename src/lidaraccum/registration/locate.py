@@ -14,7 +14,8 @@ from lidaraccum.registration.proposals import CELL_M, Reach, shift_proposals
 from lidaraccum.registration.surface_map import SurfaceMap
 
 COARSE_POINTS = 1200
-COARSE_ITERATIONS = 8
+COARSE_ITERATIONS = 6
+SHORTLIST = 5
 DISTINCT_M, DISTINCT_RAD = 0.3, 0.02
 """Two poses closer than this are one answer."""
 
@@ -55,11 +56,15 @@ def search(
 ) -> Located:
     """Follow every hypothesis on few points and coarse planes, the best two to their end."""
     few = source[:: max(1, len(source) // COARSE_POINTS)]
-    tried = []
-    for start in starts:
-        pose = align(surface, few, start.world_from_sensor, finest=2, iterations=COARSE_ITERATIONS)
-        pose = align(surface, few, pose, finest=1, iterations=COARSE_ITERATIONS)
-        tried.append((start.name, assess(surface, few, pose)))
+    roughly = [
+        (start.name, _aligned_coarsely(surface, few, start.world_from_sensor, level=2))
+        for start in starts
+    ]
+    roughly.sort(key=lambda candidate: -candidate[1].score)
+    tried = [
+        (name, _aligned_coarsely(surface, few, rough.world_from_sensor, level=1))
+        for name, rough in _distinct(roughly)[:SHORTLIST]
+    ]
     tried.sort(key=lambda candidate: -candidate[1].score)
     ends = [
         refine(surface, source, Hypothesis(name, coarse.world_from_sensor))
@@ -75,6 +80,13 @@ def search(
         rival=ends[1].alignment.score / max(best.alignment.score, 1e-9),
         rival_distance_m=float(np.linalg.norm(_pose(best)[:3, 3] - _pose(ends[1])[:3, 3])),
     )
+
+
+def _aligned_coarsely(
+    surface: SurfaceMap, few: NDArray[np.float64], start: rigid.Pose, level: int
+) -> Alignment:
+    pose = align(surface, few, start, finest=level, iterations=COARSE_ITERATIONS)
+    return assess(surface, few, pose, finest=1)
 
 
 def proposed(

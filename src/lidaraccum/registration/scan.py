@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lidaraccum.data.frame import BoolArray, Frame
 from lidaraccum.geometry import voxel
-from lidaraccum.registration.deskew import SweepClock, deskewed
+from lidaraccum.registration.deskew import SweepClock, deskewed, transform_along
 from lidaraccum.registration.settings import RegistrationSettings
 
 StaticMask = Callable[[Frame], BoolArray]
@@ -27,26 +27,35 @@ class Scan:
     Attributes:
         index: Place of the frame in the sequence.
         raw: The frame as read.
-        frame: The frame, deskewed where that was called for.
         usable: (N,) bool: points that registration may use.
-        source: (M, 3) float64: the thinned usable points that are aligned, sensor coordinates.
+        rows: (M,) int64: the thin choice of them that is aligned.
+        fractions: (N,) time of each point from the stamp in frame intervals; None: no motion
+            inside the sweep.
     """
 
     index: int
     raw: Frame
-    frame: Frame
     usable: BoolArray
-    source: NDArray[np.float64]
+    rows: NDArray[np.int64]
+    fractions: NDArray[np.float64] | None
+
+    def source(self, twist: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The chosen points (M, 3) at the stamp, had the sensor moved by ``twist`` (6,)."""
+        points = self.raw.points[self.rows].astype(np.float64)
+        if self.fractions is None:
+            return points
+        return transform_along(twist, self.fractions[self.rows], points)
+
+    def straightened(self, twist: NDArray[np.float64]) -> Frame:
+        """The whole frame at the stamp, had the sensor moved by ``twist`` (6,)."""
+        if self.fractions is None:
+            return self.raw
+        return deskewed(self.raw, twist, self.fractions)
 
     @property
-    def points(self) -> NDArray[np.float64]:
-        """All usable points (K, 3), sensor coordinates at the stamp."""
-        return self.frame.points[self.usable].astype(np.float64)
-
-    @property
-    def deskewed(self) -> bool:
-        """Whether the points were moved to the stamp."""
-        return self.frame is not self.raw
+    def bends(self) -> bool:
+        """Whether there is motion inside the sweep to be undone."""
+        return self.fractions is not None
 
 
 def usable_points(
@@ -66,25 +75,18 @@ def usable_points(
 
 
 def prepare(
-    index: int,
-    raw: Frame,
-    usable: BoolArray,
-    motion: tuple[SweepClock, NDArray[np.float64], float],
-    source_voxel_m: float,
+    index: int, raw: Frame, usable: BoolArray, clock: SweepClock, sizes: tuple[float, float]
 ) -> Scan:
-    """Deskew a frame and choose its source points.
+    """Choose a frame's source points and find out when each point was measured.
 
     Args:
         index: Place of the frame in the sequence.
         raw: The frame as read.
         usable: (N,) from `usable_points`.
-        motion: How time runs within a sweep, the twist (6,) over one frame interval, and that
-            interval in seconds.
-        source_voxel_m: Edge of the voxels that give one source point each.
+        clock: How time runs within a sweep.
+        sizes: Seconds of a frame interval; metres of the voxels that give one source point each.
     """
-    clock, twist, interval_s = motion
-    fractions = clock.fractions(raw, interval_s)
-    frame = raw if fractions is None else deskewed(raw, twist, fractions)
-    points = frame.points[usable]
-    source = points[voxel.thin(points, source_voxel_m)].astype(np.float64)
-    return Scan(index, raw, frame, usable, source)
+    interval_s, source_voxel_m = sizes
+    candidates = np.flatnonzero(usable)
+    rows = candidates[voxel.thin(raw.points[candidates], source_voxel_m)]
+    return Scan(index, raw, usable, rows, clock.fractions(raw, interval_s))

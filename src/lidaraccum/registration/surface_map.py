@@ -29,6 +29,9 @@ MIN_FLATNESS = 4.0
 SENSOR_NOISE_M = 0.02
 """No plane is believed to be thinner than this."""
 
+FORGET_EVERY = 5
+"""Frames between two clearings of the map."""
+
 _UNKNOWN = np.inf
 
 
@@ -128,7 +131,7 @@ class SurfaceMap:
         counts = np.diff(np.append(starts, len(keys)))
         centres = voxel.voxel_centres(unique, size)
         local = points[order] - np.repeat(centres, counts, axis=0)
-        moments = np.add.reduceat(planes.point_moments(local), starts, axis=0)
+        moments = planes.summed_moments(local, starts)
         self.levels[0].add(unique, moments, now)
         for level in self.levels[1:]:
             coarse_keys = voxel.voxel_keys(centres, level.size_m)
@@ -139,6 +142,8 @@ class SurfaceMap:
 
     def forget_far(self, position: NDArray[np.float64], now: int) -> None:
         """Drop what is far from the sensor's position (3,) or was not seen for long."""
+        if now % FORGET_EVERY:
+            return
         for level in self.levels:
             near = np.abs(level.means - position).max(axis=1) < self.radius_m
             level.keep(near & (now - level.last_seen <= self.memory_frames))

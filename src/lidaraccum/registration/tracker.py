@@ -37,6 +37,15 @@ PATIENCE = 3
 
 
 @dataclass(frozen=True, eq=False)
+class Fix:
+    """The last frame on the map: its place in the sequence, stamp in s, world_from_sensor."""
+
+    index: int
+    stamp: float
+    world_from_sensor: rigid.Pose
+
+
+@dataclass(frozen=True, eq=False)
 class Expectation:
     """What is thought of a frame before its points are asked.
 
@@ -75,29 +84,26 @@ class Tracker:
         self._pace = pace
         self._surface = SurfaceMap(settings.voxel_m, settings.max_range_m * 1.1)
         self._judge = Judge(settings)
-        self._last: RegisteredFrame | None = None
+        self._last: Fix | None = None
         self._first_origin = np.zeros(3)
         self._lost = 0
 
     def start(self, index: int, raw: Frame, usable: BoolArray, pose: rigid.Pose) -> RegisteredFrame:
         """Put the first frame on the empty map."""
         self._first_origin = raw.origin
-        scan = self._prepare(index, raw, usable, self.twist)
-        self._remember(scan, pose)
+        scan = self._prepare(index, raw, usable)
+        twist = np.zeros(6) if self.twist is None else self.twist
         quality = RegistrationQuality("first", overlap=1.0, residual_m=0.0)
-        return RegisteredFrame(index, scan.frame, pose, quality, scan.deskewed)
+        return self._remember(scan, twist, pose, quality)
 
     def hold(self, index: int, raw: Frame, usable: BoolArray, pose: rigid.Pose) -> RegisteredFrame:
         """Take a given pose as it is; only measure how well the map speaks for it."""
-        assert self._last is not None
         steps = self._steps_to(index, raw)
-        self.twist = rigid.logarithm(rigid.invert(self._last.world_from_sensor) @ pose) / steps
-        scan = self._prepare(index, raw, usable, self.twist)
-        located = Located("given", assess(self._surface, scan.source, pose))
-        speed = self._speed(located, steps)
-        quality = self._judge.judge(located, speed)
-        self._remember(scan, pose)
-        return RegisteredFrame(index, scan.frame, pose, quality, scan.deskewed)
+        self.twist = self._twist_to(pose, steps)
+        scan = self._prepare(index, raw, usable)
+        located = Located("given", assess(self._surface, scan.source(self.twist), pose))
+        quality = self._judge.judge(located, self._speed(pose, steps))
+        return self._remember(scan, self.twist, pose, quality)
 
     def follow(
         self, index: int, raw: Frame, usable: BoolArray, hints: tuple[Hypothesis, ...] = ()
@@ -110,17 +116,16 @@ class Tracker:
             usable: (N,) points that may be used.
             hints: Poses from elsewhere, believed before constant velocity.
         """
+        scan = self._prepare(index, raw, usable)
         expectation = self._expect(index, raw, hints)
         twist = self._twist_to(expectation.starts[0].world_from_sensor, expectation.steps)
-        scan = self._prepare(index, raw, usable, twist)
-        located = self._locate(scan, expectation)
+        located = self._locate(scan.source(twist), expectation)
         for _ in range(MAX_PASSES - 1):
             found = self._twist_to(located.alignment.world_from_sensor, expectation.steps)
-            if not scan.deskewed or _are_same(found, twist):
+            if not scan.bends or _are_same(found, twist):
                 break
             twist = found
-            scan = self._prepare(index, raw, usable, twist)
-            again = refine(self._surface, scan.source, _start_of(located))
+            again = refine(self._surface, scan.source(twist), _start_of(located))
             located = replace(located, alignment=again.alignment)
         return self._conclude(scan, located, expectation)
 
@@ -139,11 +144,11 @@ class Tracker:
         starts.append(Hypothesis("still", last))
         return Expectation(tuple(starts), steps, known)
 
-    def _locate(self, scan: Scan, expectation: Expectation) -> Located:
+    def _locate(self, source: NDArray[np.float64], expectation: Expectation) -> Located:
         """The likeliest start if it holds; otherwise the best of all that can be thought of."""
         first = expectation.starts[0]
         if expectation.known:
-            found = refine(self._surface, scan.source, first)
+            found = refine(self._surface, source, first)
             if self._judge.trusts(found) and self._is_smooth(found, first, expectation.steps):
                 return found
         interval_s = expectation.steps * self._pace.interval_s
@@ -153,8 +158,8 @@ class Tracker:
         )
         # How the sensor is mounted is unknown until it has moved once.
         axes = (2,) if expectation.known else (2, 0, 1)
-        shifts = proposed(self._surface, scan.source, first.world_from_sensor, reach, axes)
-        return search(self._surface, scan.source, [*expectation.starts, *shifts])
+        shifts = proposed(self._surface, source, first.world_from_sensor, reach, axes)
+        return search(self._surface, source, [*expectation.starts, *shifts])
 
     def _is_smooth(self, found: Located, start: Hypothesis, steps: float) -> bool:
         interval_s = steps * self._pace.interval_s
@@ -163,47 +168,57 @@ class Tracker:
 
     def _conclude(self, scan: Scan, located: Located, expectation: Expectation) -> RegisteredFrame:
         """Believe the answer, or keep the expectation where nothing fits."""
-        lost = self._judge.is_lost(located)
-        quality = self._judge.judge(located, self._speed(located, expectation.steps))
         pose = located.alignment.world_from_sensor
+        lost = self._judge.is_lost(located)
+        quality = self._judge.judge(located, self._speed(pose, expectation.steps))
         self._lost = self._lost + 1 if lost else 0
         if lost:
-            pose = expectation.starts[0].world_from_sensor
-            quality = replace(quality, hypothesis=expectation.starts[0].name)
+            kept = expectation.starts[0]
+            pose, quality = kept.world_from_sensor, replace(quality, hypothesis=kept.name)
+        twist = self._twist_to(pose, expectation.steps)
+        if not lost:
+            self.twist = twist
+        elif self._lost <= PATIENCE:
+            return _registered(scan, scan.straightened(twist), pose, quality)
         else:
-            self.twist = self._twist_to(pose, expectation.steps)
-        if self._lost > PATIENCE:
             self._judge.forget()
-        if not lost or self._lost > PATIENCE:
-            self._remember(scan, pose)
-        return RegisteredFrame(scan.index, scan.frame, pose, quality, scan.deskewed)
+        return self._remember(scan, twist, pose, quality)
 
-    def _remember(self, scan: Scan, pose: rigid.Pose) -> None:
-        self._surface.insert(rigid.transform(pose, scan.points), scan.index)
+    def _remember(
+        self,
+        scan: Scan,
+        twist: NDArray[np.float64],
+        pose: rigid.Pose,
+        quality: RegistrationQuality,
+    ) -> RegisteredFrame:
+        frame = scan.straightened(twist)
+        self._surface.insert(rigid.transform(pose, frame.points[scan.usable]), scan.index)
         self._surface.forget_far(pose[:3, 3], scan.index)
-        # Of the frame only the stamp is needed: let go of its points.
-        stub = Frame(np.zeros((0, 3), np.float32), stamp=scan.raw.stamp)
-        quality = RegistrationQuality("", overlap=1.0, residual_m=0.0)
-        self._last = RegisteredFrame(scan.index, stub, pose, quality)
+        self._last = Fix(scan.index, frame.stamp, pose)
+        return _registered(scan, frame, pose, quality)
 
-    def _prepare(
-        self, index: int, raw: Frame, usable: BoolArray, twist: NDArray[np.float64] | None
-    ) -> Scan:
-        motion = (self.clock, np.zeros(6) if twist is None else twist, self._pace.interval_s)
-        return prepare(index, raw, usable, motion, self._settings.source_voxel_m)
+    def _prepare(self, index: int, raw: Frame, usable: BoolArray) -> Scan:
+        sizes = (self._pace.interval_s, self._settings.source_voxel_m)
+        return prepare(index, raw, usable, self.clock, sizes)
 
     def _steps_to(self, index: int, raw: Frame) -> float:
         assert self._last is not None
         missed = index - self._last.index
-        return self._pace.steps(self._last.frame.stamp, raw.stamp, missed)
+        return self._pace.steps(self._last.stamp, raw.stamp, missed)
 
     def _twist_to(self, pose: rigid.Pose, steps: float) -> NDArray[np.float64]:
         assert self._last is not None
         return rigid.logarithm(rigid.invert(self._last.world_from_sensor) @ pose) / steps
 
-    def _speed(self, located: Located, steps: float) -> float:
-        twist = self._twist_to(located.alignment.world_from_sensor, steps)
+    def _speed(self, pose: rigid.Pose, steps: float) -> float:
+        twist = self._twist_to(pose, steps)
         return float(np.linalg.norm(twist[3:])) / self._pace.interval_s
+
+
+def _registered(
+    scan: Scan, frame: Frame, pose: rigid.Pose, quality: RegistrationQuality
+) -> RegisteredFrame:
+    return RegisteredFrame(scan.index, frame, pose, quality, deskewed=scan.bends)
 
 
 def _are_same(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
