@@ -119,6 +119,8 @@ class Labels:
         boxes: The frame's objects.
         annotated: (N,) bool: only such points are scored; None when all are.
         semantic: (N,) class index of the data set, or None.
+        points_at_stamp: (N, 3) metres: where each point was at the frame's stamp, in sensor
+            coordinates then, movers moved too; None where the frame's own points say it.
     """
 
     world_from_sensor: NDArray[np.float64]
@@ -128,6 +130,7 @@ class Labels:
     boxes: tuple[Box, ...] = ()
     annotated: BoolArray | None = None
     semantic: IntArray | None = None
+    points_at_stamp: FloatArray | None = None
 
     def __post_init__(self) -> None:
         if self.world_from_sensor.shape != (4, 4):
@@ -137,6 +140,9 @@ class Labels:
             values = getattr(self, name)
             if values is not None and values.shape != (count,):
                 raise InputError(f"labels disagree: {name} is {values.shape}, not ({count},)")
+        places = self.points_at_stamp
+        if places is not None and places.shape != (count, 3):
+            raise InputError(f"labels disagree: {places.shape} points_at_stamp for {count} points")
 
     @property
     def world_from_object(self) -> dict[int, NDArray[np.float64]]:

@@ -174,6 +174,8 @@ def write_labels(path: Path, labels: Labels) -> None:
         arrays["annotated"] = labels.annotated
     if labels.semantic is not None:
         arrays["semantic"] = labels.semantic
+    if labels.points_at_stamp is not None:
+        arrays["points_at_stamp"] = np.asarray(labels.points_at_stamp, np.float32)
     with path.open("wb") as file:
         np.savez_compressed(file, allow_pickle=False, **arrays)
 

@@ -73,6 +73,7 @@ def labels_of_npz(path: Path, world_from_sensor: rigid.Pose, boxes: tuple[Box, .
         boxes=boxes,
         annotated=None if annotated is None else np.asarray(annotated, dtype=np.bool_),
         semantic=arrays.get("semantic"),
+        points_at_stamp=arrays.get("points_at_stamp"),
     )
 
 
@@ -83,6 +84,7 @@ def label_fields(path: Path) -> tuple[str, ...]:
 
 def rows_of_labels(labels: Labels, rows: NDArray[np.int64]) -> Labels:
     """The labels of the file's rows (M,) that became points."""
+    places = labels.points_at_stamp
     return Labels(
         world_from_sensor=labels.world_from_sensor,
         foreground=labels.foreground[rows],
@@ -91,6 +93,7 @@ def rows_of_labels(labels: Labels, rows: NDArray[np.int64]) -> Labels:
         boxes=labels.boxes,
         annotated=None if labels.annotated is None else labels.annotated[rows],
         semantic=None if labels.semantic is None else labels.semantic[rows],
+        points_at_stamp=None if places is None else places[rows],
     )
 
 
