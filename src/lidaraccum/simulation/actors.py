@@ -33,7 +33,9 @@ class Actor:
     def mesh_at(self, time: float) -> Mesh:
         """The mesh of its step at a time; a still one stands in its first phase."""
         steps = self.trajectory.travelled_at(time) / self.model.stride_m
-        return self.model.phases[int(np.floor(steps * len(self.model.phases))) % len(self.model.phases)]
+        return self.model.phases[
+            int(np.floor(steps * len(self.model.phases))) % len(self.model.phases)
+        ]
 
 
 @dataclass(frozen=True, eq=False)

@@ -85,10 +85,14 @@ def _stations(shape: BodyShape) -> Array:
     corners = [x for x, _ in shape.outline]
     pillars = [x + side for x in shape.pillars for side in (-0.05, 0.05)]
     arches = [
-        x + reach * shape.wheel_radius for x in shape.wheels for reach in (-1.15, -0.7, 0, 0.7, 1.15)
+        x + reach * shape.wheel_radius
+        for x in shape.wheels
+        for reach in (-1.15, -0.7, 0, 0.7, 1.15)
     ]
     fill = list(np.linspace(corners[0], corners[-1], 9))
-    inside = np.clip([*corners, *pillars, *arches, *fill, *shape.side_glass], corners[-1], corners[0])
+    inside = np.clip(
+        [*corners, *pillars, *arches, *fill, *shape.side_glass], corners[-1], corners[0]
+    )
     return np.unique(np.round(inside, 2))[::-1]
 
 

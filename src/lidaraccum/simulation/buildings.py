@@ -45,14 +45,16 @@ def _facade(
     piers = (np.r_[-0.5 * width, right], np.r_[left, 0.5 * width])
     wall += [_upright(*piers, bottom, top, 0.0) for bottom, top in zip(low, high, strict=True)]
     parts = [quads(np.concatenate(wall), finish)]
-    panes = np.concatenate([_upright(left, right, a, b, recess) for a, b in zip(low, high, strict=True)])
+    panes = np.concatenate(
+        [_upright(left, right, a, b, recess) for a, b in zip(low, high, strict=True)]
+    )
     shut = rng.random(len(panes)) < rng.choice([0.0, 0.2, 0.6])
     parts.append(quads(panes[~shut], Finish(Surface.GLASS, 0.1)))
     parts.append(quads(panes[shut], Finish(Surface.BUILDING, float(rng.uniform(0.3, 0.7)))))
     parts.append(quads(_reveals(panes, recess), finish))
-    room = np.concatenate(
-        [_upright(left, right, a, b, recess + rng.uniform(0.4, 2.5)) for a, b in zip(low, high, strict=True)]
-    )  # fmt: skip
+    behind = np.zeros((len(panes), 1, 3))
+    behind[:, 0, 1] = rng.uniform(0.4, 2.5, len(panes))
+    room = panes + behind
     parts.append(quads(_widened(room, 0.3), Finish(Surface.BUILDING, 0.3)))
     return merge(parts)
 
@@ -99,14 +101,21 @@ def _roof(width: float, depth: float, height: float, rng: np.random.Generator) -
     x, front, back, middle = 0.5 * width + eave, -eave, depth + eave, 0.5 * depth
     low = height - eave * rise / middle
     planes = [
-        [(-x, front, low), (x, front, low), (x, middle, height + rise), (-x, middle, height + rise)],
+        [
+            (-x, front, low),
+            (x, front, low),
+            (x, middle, height + rise),
+            (-x, middle, height + rise),
+        ],
         [(-x, back, low), (x, back, low), (x, middle, height + rise), (-x, middle, height + rise)],
     ]
     gables = [
         [(s, 0, height), (s, depth, height), (s, middle, height + rise), (s, middle, height + rise)]
         for s in (-0.5 * width, 0.5 * width)
     ]
-    chimney = box((0.6, 0.6, 1.5), (rng.uniform(-0.3, 0.3) * width, middle, height + 0.7 * rise), tiles)
+    chimney = box(
+        (0.6, 0.6, 1.5), (rng.uniform(-0.3, 0.3) * width, middle, height + 0.7 * rise), tiles
+    )
     return merge([quads(np.array(planes), tiles), quads(np.array(gables), tiles), chimney])
 
 
@@ -116,7 +125,9 @@ def _balconies(width: float, storeys: int, storey: float, rng: np.random.Generat
     slab = Finish(Surface.BUILDING, 0.4)
     front = Finish(Surface.MESH_FENCE if rng.random() < 0.5 else Surface.BUILDING, 0.4)
     across, out = rng.uniform(1.5, 3.5), rng.uniform(0.7, 1.6)
-    columns = np.arange(-0.5 * width + across, 0.5 * width - 0.5 * across, across * rng.uniform(1.4, 3))
+    columns = np.arange(
+        -0.5 * width + across, 0.5 * width - 0.5 * across, across * rng.uniform(1.4, 3)
+    )
     parts = []
     for level in range(1, storeys):
         for x in columns:

@@ -107,7 +107,12 @@ def _rear(
     if kind in ("saloon", "coupe"):
         boot = length * rng.uniform(0.12, 0.16)
         fall = rng.uniform(0.5, 0.8)
-        return (crown, (tail + boot + fall, height * 0.96), (tail + boot, deck), (tail + 0.05, deck))
+        return (
+            crown,
+            (tail + boot + fall, height * 0.96),
+            (tail + boot, deck),
+            (tail + 0.05, deck),
+        )
     if kind == "pickup":
         bed = length * rng.uniform(0.27, 0.33)
         return (
@@ -115,7 +120,12 @@ def _rear(
             (tail + 0.02, deck * 0.9),
         )  # fmt: skip
     fall = rng.uniform(0.12, 0.3) if kind in ("estate", "mpv", "suv") else rng.uniform(0.25, 0.5)
-    return (crown, (tail + 0.12 + fall, height * 0.97), (tail + 0.1, deck), (tail + 0.03, deck * 0.8))
+    return (
+        crown,
+        (tail + 0.12 + fall, height * 0.97),
+        (tail + 0.1, deck),
+        (tail + 0.03, deck * 0.8),
+    )
 
 
 def draw_van(rng: np.random.Generator) -> Model:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -55,7 +55,7 @@ class Catalogue:
             choice = len(pool) - 1
         return pool[choice].repainted(draw_paint(self._rng))
 
-    def draw_any(self, chances: dict[str, float]) -> Model:
+    def draw_any(self, chances: Mapping[str, float]) -> Model:
         """A model of a kind drawn by its chance."""
         weights = np.array(list(chances.values()))
         return self.draw(str(self._rng.choice(list(chances), p=weights / weights.sum())))

@@ -3,168 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lidaraccum.data.frame import Box, Frame, Labels
-from lidaraccum.errors import SettingsError
-from lidaraccum.geometry.rigid import invert
+from lidaraccum.data.frame import Frame, Labels
+from lidaraccum.geometry.rigid import invert, transform
 from lidaraccum.simulation.actors import Actor
 from lidaraccum.simulation.ego import Ego, draw_body, draw_mount, drive_ego
-from lidaraccum.simulation.motion import MANOEUVRES, sample_times, speed_profile
-from lidaraccum.simulation.networks import SCENE_KINDS, draw_kind, lay_network
+from lidaraccum.simulation.labelling import Movables, Seen, label
+from lidaraccum.simulation.motion import sample_times, speed_profile
+from lidaraccum.simulation.networks import lay_network
 from lidaraccum.simulation.raycast import Open3DRayCaster, RayCaster
-from lidaraccum.simulation.returns import (
-    IDEAL,
-    Echoes,
-    Realism,
-    draw_bias,
-    draw_weather,
-    measure,
-)
+from lidaraccum.simulation.returns import Echoes, draw_bias, measure
 from lidaraccum.simulation.scan import Encounter, Rays, Solid, Stage, aim
-from lidaraccum.simulation.sensor import RANDOM_SENSOR, SENSORS, Sensor, sensor_by_name
+from lidaraccum.simulation.settings import DriveSettings, child, draw_drive
 from lidaraccum.simulation.surfaces import Surface
+from lidaraccum.simulation.sweep_truth import Moments, follow_actors
 from lidaraccum.simulation.traffic import Traffic
 from lidaraccum.simulation.world import World, build_world
 
+__all__ = ["DriveSettings", "SimulatedSequence", "simulate"]
+
 Array = NDArray[np.float64]
-DYNAMIC_MPS = 0.5
-"""What moves faster is dynamic."""
 JITTER_RAD = 0.0006
-WEATHERS = ("clear", "rain", "fog", "snow")
-
-
-@dataclass(frozen=True)
-class DriveSettings:
-    """What to simulate; whatever is None is drawn from the seed.
-
-    Attributes:
-        seed: 0 or more. The same settings give the same bytes.
-        frames: How many.
-        sensor: A name in ``SENSORS``, or ``random``.
-        rate_hz: Turns a second.
-        scene: One of ``SCENE_KINDS``.
-        speed_mps: The ego's speed at the start (bends may keep it lower).
-        manoeuvre: One of ``MANOEUVRES``: what the ego does with its speed.
-        rolling_shutter: Each column measured at its own time, from where the sensor is then;
-            otherwise all at the stamp.
-        compensated: Points of a rolling shutter moved to the stamp by the true ego-motion, as
-            data sets deliver them (movers stay smeared by their own motion).
-        coordinates: ``sensor``, or ``vehicle``: on the ground under the car.
-        weather: clear, rain, fog or snow.
-        zeros: Whether pulses that never came back are delivered as points at 0, 0, 0.
-        exact: Without noise, losses, mixed edges or weather; for tests of laws.
-    """
-
-    seed: int = 0
-    frames: int = 5
-    sensor: str | None = None
-    rate_hz: float | None = None
-    scene: str | None = None
-    speed_mps: float | None = None
-    manoeuvre: str | None = None
-    rolling_shutter: bool | None = None
-    compensated: bool | None = None
-    coordinates: Literal["sensor", "vehicle"] | None = None
-    weather: str | None = None
-    zeros: bool | None = None
-    exact: bool = False
-
-    def __post_init__(self) -> None:
-        if self.seed < 0:
-            raise SettingsError(f"a seed is 0 or more, not {self.seed}")
-        if self.frames < 1:
-            raise SettingsError(f"a drive has one frame or more, not {self.frames}")
-        if self.rate_hz is not None and not 1.0 <= self.rate_hz <= 50.0:
-            raise SettingsError(f"a sensor turns 1 to 50 times a second, not {self.rate_hz}")
-        if self.speed_mps is not None and not 0.0 <= self.speed_mps <= 45.0:
-            raise SettingsError(f"the ego drives 0 to 45 m/s, not {self.speed_mps}")
-        for word, value, known in (
-            ("sensor", self.sensor, (*SENSORS, RANDOM_SENSOR)),
-            ("scene", self.scene, SCENE_KINDS),
-            ("manoeuvre", self.manoeuvre, MANOEUVRES),
-            ("weather", self.weather, WEATHERS),
-            ("coordinates", self.coordinates, ("sensor", "vehicle")),
-        ):
-            if value is not None and value not in known:
-                raise SettingsError(f"no {word} is called {value!r}", hint=f"known: {', '.join(known)}")
-
-
-@dataclass(frozen=True)
-class DrawnDrive:
-    """Settings with nothing left open, and what follows from them."""
-
-    sensor: Sensor
-    rate_hz: float
-    scene: str
-    speed_mps: float
-    manoeuvre: str
-    rolling_shutter: bool
-    compensated: bool
-    vehicle_coordinates: bool
-    zeros: bool
-    realism: Realism
-
-
-def draw_drive(settings: DriveSettings) -> DrawnDrive:
-    """Fill in what the settings leave open. What is drawn does not depend on what is given."""
-    rng = np.random.default_rng([settings.seed, 1])
-    children = [_child(rng) for _ in range(6)]
-    chance = rng.random(8)
-    sensor_name = settings.sensor or _pick(chance[0], [*SENSORS, *[RANDOM_SENSOR] * 4])
-    sensor = sensor_by_name(sensor_name, children[0])
-    rate = settings.rate_hz or float(children[1].choice(sensor.rates_hz))
-    drawn_speed = _draw_speed(children[2])
-    speed = drawn_speed if settings.speed_mps is None else settings.speed_mps
-    scene = settings.scene or draw_kind(speed, children[3])
-    manoeuvre = settings.manoeuvre or _draw_manoeuvre(speed, children[4])
-    rolling = _either(settings.rolling_shutter, chance[1] < 0.85)
-    compensated = _either(settings.compensated, chance[2] < 0.5) and rolling
-    vehicle = (settings.coordinates or ("vehicle" if chance[3] < 0.2 else "sensor")) == "vehicle"
-    zeros = _either(settings.zeros, chance[4] < 0.12)
-    weather = settings.weather or _pick(chance[5], ["clear"] * 16 + ["rain", "rain", "fog", "snow"])
-    realism = _draw_realism(weather, children[5])
-    return DrawnDrive(
-        sensor, rate, scene, speed, manoeuvre, rolling, compensated, vehicle,
-        zeros, IDEAL if settings.exact else realism,
-    )  # fmt: skip
-
-
-def _child(rng: np.random.Generator) -> np.random.Generator:
-    return np.random.default_rng(rng.integers(2**63))
-
-
-def _pick(chance: float, names: list[str]) -> str:
-    return names[int(chance * len(names))]
-
-
-def _either(given: bool | None, drawn: bool) -> bool:
-    return bool(drawn) if given is None else given
-
-
-def _draw_speed(rng: np.random.Generator) -> float:
-    """0 to 30 m/s: standing, town, main road, motorway."""
-    low, high = ((0, 0), (0.5, 9), (7, 15), (15, 22), (22, 30))[int(rng.choice(5, p=[0.15, 0.3, 0.35, 0.12, 0.08]))]
-    return float(rng.uniform(low, high))
-
-
-def _draw_manoeuvre(speed: float, rng: np.random.Generator) -> str:
-    if speed < 0.2:
-        return str(rng.choice(["stand", "pull away"], p=[0.8, 0.2]))
-    return str(rng.choice(["cruise", "brake", "accelerate"], p=[0.7, 0.16, 0.14]))
-
-
-def _draw_realism(weather: str, rng: np.random.Generator) -> Realism:
-    return Realism(
-        noise=float(rng.uniform(0.5, 1.4)),
-        drop=float(rng.choice([0.002, 0.01, 0.03])),
-        mixed=float(rng.uniform(0.02, 0.15)),
-        weather=draw_weather(weather, rng),
-    )
+"""One sigma of where a ray goes against where the sensor says it went."""
+BOX_MARGIN_M = 20.0
+"""Boxes are listed this far beyond the sensor's reach."""
 
 
 class SimulatedSequence:
@@ -178,17 +44,18 @@ class SimulatedSequence:
         duration = settings.frames * self._period
         rng = np.random.default_rng([settings.seed, 2])
         reach = (self.drawn.speed_mps + 2.0) * duration
-        network = lay_network(self.drawn.scene, reach, _child(rng))
-        self.world: World = build_world(network, reach, _child(rng))
-        self.ego = self._drive(duration, _child(rng))
-        self.actors: tuple[Actor, ...] = Traffic(self.world, self.ego, _child(rng)).populate()
-        self._bias = draw_bias(self.drawn.sensor, _child(rng))
+        network = lay_network(self.drawn.scene, reach, child(rng))
+        self.world: World = build_world(network, reach, child(rng))
+        self.ego = self._drive(duration, child(rng))
+        self.actors: tuple[Actor, ...] = Traffic(self.world, self.ego, child(rng)).populate()
+        self.movables = Movables(self.world.stills, self.actors)
+        self._bias = draw_bias(self.drawn.sensor, child(rng))
         self._stage = Stage(self.world, self.actors, caster)
-        self._start_azimuth = float(_child(rng).choice([np.pi, np.pi, 0.0, 0.5 * np.pi]))
-        self._own = self._see_own_car()
+        self._start_azimuth = float(child(rng).choice([np.pi, np.pi, 0.0, 0.5 * np.pi]))
+        self._own: NDArray[np.float32] = self._see_own_car()
         self._last: tuple[int, Frame, Labels] | None = None
 
-    # -- the protocol --------------------------------------------------------------------------------
+    # -- the protocol --
 
     @property
     def name(self) -> str:
@@ -223,7 +90,7 @@ class SimulatedSequence:
         """The truth about frame ``index``, row by row with its points."""
         return self._frame(index)[1]
 
-    # -- casting ---------------------------------------------------------------------------------------
+    # -- casting --
 
     def stamp(self, index: int) -> float:
         """Reference time of a frame, seconds: the middle of its sweep."""
@@ -242,7 +109,8 @@ class SimulatedSequence:
             network.ego, network.ego_start, speeds, duration, self.world.terrain, rng
         )
         mount = draw_mount(rng)
-        return Ego(trajectory, mount, speeds, draw_body(mount, rng))
+        body = draw_body(mount, rng)
+        return Ego(trajectory, mount, speeds, body, bool(rng.random() < 0.5))
 
     def _see_own_car(self) -> NDArray[np.float32]:
         """(C, B) distance to the own car's body, the same in every turn; inf where it is not."""
@@ -280,13 +148,8 @@ class SimulatedSequence:
         jitter = JITTER_RAD * drawn.realism.noise
         rays = aim(drawn.sensor, times, azimuth, poses, jitter, rng)
         met = self._stage.meet(rays, drawn.sensor, rng, drawn.sensor.max_range_m)
-        met = _before_own_car(met, self._own)
-        shape = self._own.shape
-        echoes = measure(
-            met.distance.reshape(shape), met.surface.reshape(shape),
-            met.reflectivity.reshape(shape), met.slant.reshape(shape), drawn.sensor,
-            drawn.realism, self._bias, rng,
-        )  # fmt: skip
+        met = _before_own_car(met, self._own, self.ego.body_removed)
+        echoes = measure(met.shaped(self._own.shape), drawn.sensor, drawn.realism, self._bias, rng)
         return self._deliver(index, rays, offsets, met, echoes)
 
     def _deliver(
@@ -310,12 +173,31 @@ class SimulatedSequence:
             ring=ring.astype(np.int16),
             name=f"{index:06d}",
         )
-        solid = came & ~echoes.clutter.ravel()[kept]
-        return frame, self._label(index, met, kept, solid, echoes)
+        seen = Seen(
+            met.instance[kept],
+            met.surface[kept],
+            came & ~echoes.clutter.ravel()[kept],
+            echoes.mixed.ravel()[kept],
+        )
+        pose = self.world_from_sensor(np.array([self.stamp(index)]))[0]
+        reach = self.drawn.sensor.max_range_m + BOX_MARGIN_M
+        labels = label(seen, self.movables, self.stamp(index), pose, reach)
+        if self.drawn.rolling_shutter and not self.drawn.compensated:
+            at_stamp = self._at_stamp(frame, rays, column, labels)
+            at_stamp[~came] = 0.0
+            labels = replace(labels, points_at_stamp=at_stamp)
+        return frame, labels
 
-    def _places(
-        self, index: int, rays: Rays, distance: NDArray[np.float32]
+    def _at_stamp(
+        self, frame: Frame, rays: Rays, column: NDArray[np.int64], labels: Labels
     ) -> NDArray[np.float32]:
+        """(N, 3) metres: where each point was at the stamp, in the frame's coordinates then."""
+        then = Moments(rays.times, self.world_from_sensor(rays.times), column)
+        world = then.to_world(frame.points)
+        follow_actors(world, labels.instance, then, frame.stamp, self.actors)
+        return transform(invert(labels.world_from_sensor), world).astype(np.float32)
+
+    def _places(self, index: int, rays: Rays, distance: NDArray[np.float32]) -> NDArray[np.float32]:
         """(C, B, 3) float32 metres in the frame's coordinates, from distances (C, B)."""
         points = rays.local * distance[..., None]
         points[..., 2] += self.drawn.sensor.height.astype(np.float32)
@@ -327,58 +209,15 @@ class SimulatedSequence:
         if self.drawn.vehicle_coordinates:
             frame_from_sensor = mount @ frame_from_sensor
         rotation = np.swapaxes(frame_from_sensor[:, :3, :3], 1, 2).astype(np.float32)
-        return points @ rotation + frame_from_sensor[:, None, :3, 3].astype(np.float32)
-
-    def _label(
-        self, index: int, met: Encounter, kept: NDArray[np.int64], solid: NDArray[np.bool_],
-        echoes: Echoes,
-    ) -> Labels:  # fmt: skip
-        instance = np.where(solid, met.instance[kept], 0).astype(np.int32)
-        surface = np.where(solid, met.surface[kept], np.uint8(Surface.CLUTTER))
-        stamp = self.stamp(index)
-        moving = [a.id for a in self.actors if a.trajectory.speed_at(stamp) > DYNAMIC_MPS]
-        dynamic = np.zeros(len(self.world.stills) + len(self.actors) + 1, dtype=np.bool_)
-        dynamic[moving] = True
-        scored = solid & (surface != Surface.OWN_CAR) & ~echoes.mixed.ravel()[kept]
-        pose = self.world_from_sensor(np.array([stamp]))[0]
-        return Labels(
-            world_from_sensor=pose,
-            foreground=instance > 0,
-            dynamic=dynamic[instance],
-            instance=instance,
-            boxes=self._boxes(stamp, pose),
-            annotated=scored,
-            semantic=surface.astype(np.int16),
-        )
-
-    def _boxes(self, stamp: float, world_from_sensor: Array) -> tuple[Box, ...]:
-        """Boxes of all objects the sensor could reach from where it is."""
-        driving = [actor.trajectory.poses_at(np.array([stamp]))[0] for actor in self.actors]
-        speeds = [0.0] * len(self.world.stills)
-        speeds += [actor.trajectory.speed_at(stamp) for actor in self.actors]
-        movables = [*self.world.stills, *self.actors]
-        if not movables:
-            return ()
-        poses = np.stack([*(still.world_from_object for still in self.world.stills), *driving])
-        half = 0.5 * np.array([movable.model.size_lwh[2] for movable in movables])
-        poses[:, :3, 3] += half[:, None] * poses[:, :3, 2]
-        seen_from = invert(world_from_sensor) @ poses
-        reach = np.linalg.norm(seen_from[:, :3, 3], axis=1)
-        near = np.flatnonzero(reach < self.drawn.sensor.max_range_m + 20.0)
-        return tuple(
-            Box(
-                movables[row].id, movables[row].model.category, movables[row].model.size_lwh,
-                seen_from[row], speeds[row], speeds[row] > DYNAMIC_MPS,
-            )
-            for row in near
-        )  # fmt: skip
+        shift = frame_from_sensor[:, None, :3, 3].astype(np.float32)
+        return (points @ rotation + shift).astype(np.float32)
 
 
-def _before_own_car(met: Encounter, own: NDArray[np.float32]) -> Encounter:
-    """Put the own car's body before all else."""
+def _before_own_car(met: Encounter, own: NDArray[np.float32], removed: bool) -> Encounter:
+    """Put the own car's body before all else; taken out, it leaves nothing."""
     flat = own.ravel()
     nearer = flat < met.distance
-    met.distance[nearer] = flat[nearer]
+    met.distance[nearer] = np.inf if removed else flat[nearer]
     met.surface[nearer] = Surface.OWN_CAR
     met.reflectivity[nearer] = 0.3
     met.slant[nearer] = 0.5

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidaraccum.geometry.rigid import translation
 from lidaraccum.simulation.cars import draw_car
 from lidaraccum.simulation.mesh import Mesh, empty
 from lidaraccum.simulation.motion import Trajectory, distance_of, poses_of, sample_times
@@ -28,12 +27,15 @@ class Ego:
         vehicle_from_sensor: (4, 4) the mount.
         speeds: (K,) m/s at the trajectory's times.
         body: What of the car the sensor can see, in vehicle coordinates; may be empty.
+        body_removed: Whether returns of the own car are taken out (as too near), which leaves a
+            hole where it hides the street.
     """
 
     trajectory: Trajectory
     vehicle_from_sensor: Array
     speeds: Array
     body: Mesh
+    body_removed: bool = False
 
 
 def draw_mount(rng: np.random.Generator) -> Array:
@@ -76,13 +78,10 @@ def drive_ego(
     brake = -np.gradient(speeds, times)
     sideways = speeds * np.gradient(yaw, times)
     size, moving = rng.uniform(0.0, 0.005), np.clip(speeds / 5, 0, 1)
-    bounce = size * moving * np.sin(2 * np.pi * rng.uniform(0.9, 2.2) * times + rng.uniform(0, 6.28))
+    bounce = (
+        size * moving * np.sin(2 * np.pi * rng.uniform(0.9, 2.2) * times + rng.uniform(0, 6.28))
+    )
     sway = size * moving * np.sin(2 * np.pi * rng.uniform(0.5, 1.5) * times + rng.uniform(0, 6.28))
     angles = np.stack([yaw, pitch + 0.006 * brake + bounce, roll + 0.004 * sideways + sway], axis=1)
     heave = z + 2.0 * size * moving * np.sin(2 * np.pi * 1.3 * times)
     return Trajectory(times, np.column_stack([places, heave]), angles, travelled)
-
-
-def level_mount(height_m: float) -> Array:
-    """vehicle_from_sensor of a sensor mounted level at a height, metres."""
-    return translation((0.0, 0.0, height_m))

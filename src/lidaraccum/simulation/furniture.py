@@ -101,7 +101,10 @@ def table_group(rng: np.random.Generator) -> Mesh:
     finish, parts = _finish(rng), []
     for k in range(int(rng.integers(1, 4))):
         x = 2.2 * k
-        parts += [box((0.7, 0.7, 0.04), (x, 0, 0.72), finish), rod((x, 0, 0), (x, 0, 0.72), 0.05, STEEL)]
+        parts += [
+            box((0.7, 0.7, 0.04), (x, 0, 0.72), finish),
+            rod((x, 0, 0), (x, 0, 0.72), 0.05, STEEL),
+        ]
         for angle in rng.uniform(0, 2 * np.pi, int(rng.integers(1, 4))):
             seat = merge([box((0.42, 0.42, 0.04), (0, 0, 0.44), finish),
                           box((0.05, 0.42, 0.45), (0.2, 0, 0.46), finish),
@@ -134,7 +137,9 @@ def bus_stop(rng: np.random.Generator) -> Mesh:
     ]
     posts = [rod((x, back, 0), (x, back, 2.4), 0.05, STEEL) for x in np.linspace(-side, side, 4)]
     roof = box((length + 0.3, depth + 0.3, 0.12), (0, 0.1, 2.35), _finish(rng))
-    return merge([quads(np.array(panes), glass), roof, *posts, bench(rng).moved((0, back + 0.5, 0))])
+    return merge(
+        [quads(np.array(panes), glass), roof, *posts, bench(rng).moved((0, back + 0.5, 0))]
+    )
 
 
 def container(rng: np.random.Generator) -> Mesh:
@@ -158,12 +163,12 @@ def goods(rng: np.random.Generator) -> Mesh:
     """Stacked goods: pallets, pipes, timber, bales, sacks, or a heap of gravel or snow."""
     finish, choice = _finish(rng), int(rng.integers(4))
     if choice == 0:
-        stacks = [
-            box((1.2 * rng.uniform(0.7, 1), 0.8, rng.uniform(0.2, 1.9)), (1.35 * i, 0.95 * j, 0), finish)
+        pallet = (1.2 * rng.uniform(0.7, 1), 0.8)
+        return merge(
+            box((*pallet, rng.uniform(0.2, 1.9)), (1.35 * i, 0.95 * j, 0), finish)
             for i in range(int(rng.integers(1, 4)))
             for j in range(int(rng.integers(1, 3)))
-        ]  # fmt: skip
-        return merge(stacks)
+        )
     if choice == 1:
         length, radius = rng.uniform(2, 6), rng.uniform(0.08, 0.35)
         return merge(
@@ -197,7 +202,12 @@ def planter(rng: np.random.Generator) -> Mesh:
 def cabinet(rng: np.random.Generator) -> Mesh:
     """A switch cabinet, a ticket machine, a letter box, a transformer."""
     size = (rng.uniform(0.4, 2.2), rng.uniform(0.3, 1.2), rng.uniform(0.9, 2.0))
-    return merge([box(size, (0, 0, 0), _finish(rng)), box((size[0] + 0.1, size[1] + 0.1, 0.06), (0, 0, size[2]), STEEL)])
+    return merge(
+        [
+            box(size, (0, 0, 0), _finish(rng)),
+            box((size[0] + 0.1, size[1] + 0.1, 0.06), (0, 0, size[2]), STEEL),
+        ]
+    )
 
 
 def cycle_rack(rng: np.random.Generator) -> Mesh:
@@ -205,8 +215,8 @@ def cycle_rack(rng: np.random.Generator) -> Mesh:
     parts = []
     for k in range(int(rng.integers(2, 7))):
         x = 0.9 * k
-        parts += [rod((x, -0.4, 0), (x, -0.4, 0.8), 0.03, STEEL), rod((x, 0.4, 0), (x, 0.4, 0.8), 0.03, STEEL),
-                  rod((x, -0.4, 0.8), (x, 0.4, 0.8), 0.03, STEEL)]  # fmt: skip
+        parts += [rod((x, y, 0), (x, y, 0.8), 0.03, STEEL) for y in (-0.4, 0.4)]
+        parts.append(rod((x, -0.4, 0.8), (x, 0.4, 0.8), 0.03, STEEL))
     return merge(parts)
 
 
@@ -214,7 +224,9 @@ def statue(rng: np.random.Generator) -> Mesh:
     """A monument on its plinth, a fountain, a boulder."""
     if rng.random() < 0.4:
         radius = rng.uniform(0.4, 1.6)
-        return blob((radius, 0.8 * radius, 0.7 * radius), (0, 0, 0.2 * radius), _finish(rng), rng, 0.2)
+        return blob(
+            (radius, 0.8 * radius, 0.7 * radius), (0, 0, 0.2 * radius), _finish(rng), rng, 0.2
+        )
     plinth = box((1.4, 1.4, 1.2), (0, 0, 0), _finish(rng), (0.8, 0.8))
     return merge([plinth, random_body(rng, Surface.FURNITURE).moved((0, 0, 1.2))])
 

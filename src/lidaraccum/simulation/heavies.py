@@ -57,9 +57,7 @@ def _cab(length: float, width: float, height: float, paint: float) -> Mesh:
     return merge([body(shape), mirrors(nose - 0.15, width, 1.7), seats((0.0,), width, 1.0)])
 
 
-def _load(
-    kind: str, length: float, width: float, height: float, rng: np.random.Generator
-) -> Mesh:
+def _load(kind: str, length: float, width: float, height: float, rng: np.random.Generator) -> Mesh:
     finish = Finish(Surface.CARGO, float(rng.uniform(0.1, 0.8)))
     floor = box((length, width, 0.15), (0, 0, 0), TRIM)
     if kind in ("box", "container", "curtain"):

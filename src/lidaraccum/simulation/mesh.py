@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.simulation.surfaces import Surface
 
-Array = NDArray[np.floating]
+Array = NDArray[np.floating[Any]]
 Triple = tuple[float, float, float]
 
 
@@ -128,7 +129,7 @@ def quads(corners: Array, finish: Finish) -> Mesh:
     """Quadrilaterals (Q, 4, 3), metres, corners in order around each."""
     corners = np.asarray(corners, dtype=np.float32).reshape(-1, 4, 3)
     first = 4 * np.arange(len(corners), dtype=np.int32)[:, None]
-    triangles = np.concatenate([first + [0, 1, 2], first + [0, 2, 3]])
+    triangles = np.concatenate([first + np.array([0, 1, 2]), first + np.array([0, 2, 3])])
     return of_triangles(corners.reshape(-1, 3), triangles, finish)
 
 
@@ -187,7 +188,8 @@ def lathe(profile: Sequence[tuple[float, float]], finish: Finish, segments: int 
 
 _HEXAGON = np.stack([np.cos(np.pi / 3 * np.arange(6)), np.sin(np.pi / 3 * np.arange(6))], axis=1)
 _ROD_TRIANGLES = np.array(
-    [[k, (k + 1) % 6, (k + 1) % 6 + 6] for k in range(6)] + [[k, (k + 1) % 6 + 6, k + 6] for k in range(6)]
+    [[k, (k + 1) % 6, (k + 1) % 6 + 6] for k in range(6)]
+    + [[k, (k + 1) % 6 + 6, k + 6] for k in range(6)]
 )
 
 

@@ -54,7 +54,7 @@ def model(category: str, phases: tuple[Mesh, ...], stride_m: float = 1.0) -> Mod
     shift = -0.5 * (low + high)
     shift[2] = 0.0
     centred = tuple(mesh.with_vertices(mesh.vertices + shift) for mesh in phases)
-    length, width, height = high - low
+    length, width, _ = high - low
     return Model(category, centred, (float(length), float(width), float(high[2])), stride_m)
 
 

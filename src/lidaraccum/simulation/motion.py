@@ -34,7 +34,7 @@ def poses_of(places: Array, angles: Array) -> Array:
 def sample_times(duration_s: float) -> Array:
     """Times of a trajectory's samples for a drive of so many seconds."""
     count = int(np.ceil((duration_s + 2 * MARGIN_S) / STEP_S)) + 1
-    return -MARGIN_S + STEP_S * np.arange(count)
+    return -MARGIN_S + STEP_S * np.arange(count, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)

@@ -141,9 +141,7 @@ def _crossing(kind: str, reach_m: float, hand: int, rng: np.random.Generator) ->
     choice = int(rng.integers(4))
     ego, limit = (turns[choice], 7.0) if choice < 2 else (into, 40.0)
     lanes.insert(0, Lane(ego, lanes[0].speed_mps))
-    return Network(
-        kind, (main, across), tuple(lanes), ego, BEHIND_M, hand, NOWHERE, NOWHERE, limit
-    )
+    return Network(kind, (main, across), tuple(lanes), ego, BEHIND_M, hand, NOWHERE, NOWHERE, limit)
 
 
 def _roundabout(kind: str, reach_m: float, hand: int, rng: np.random.Generator) -> Network:
@@ -171,10 +169,8 @@ def _roundabout(kind: str, reach_m: float, hand: int, rng: np.random.Generator) 
     ego = ways[int(rng.integers(count - 1))]
     lanes = [Lane(ego, 7.0)] + [Lane(way, 7.0) for way in ways if way is not ego]
     islands = np.array([[*centre, radius - 3.2]])
-    start = ego.nearest(np.zeros(2))
-    return Network(
-        kind, (ring_road, *arms), tuple(lanes), ego, start, hand, NOWHERE, islands, 7.5
-    )
+    begin = ego.nearest(np.zeros(2))
+    return Network(kind, (ring_road, *arms), tuple(lanes), ego, begin, hand, NOWHERE, islands, 7.5)
 
 
 def _through_ring(

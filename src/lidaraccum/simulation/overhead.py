@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -92,11 +94,11 @@ def _wires(plot: Plot, road: Road) -> None:
     for top in tops:
         parts.append(lathe([(0.14, -high - 0.3), (0.09, 0.4)], POLE, 8).moved(tuple(top)))
     plot.take(places, 0.3)
-    for first, last in zip(tops[:-1], tops[1:], strict=True):
+    for first, last in pairwise(tops):
         if np.linalg.norm(last - first) > 1.5 * gap:
             continue
         share = np.linspace(0, 1, 7)[:, None]
         sag = np.array([0.0, 0.0, -1.0]) * 4 * share * (1 - share) * rng.uniform(0.3, 1.2)
         cable = first + share * (last - first) + sag
-        parts += [rod(a, b, 0.015, POLE) for a, b in zip(cable[:-1], cable[1:], strict=True)]
+        parts += [rod(a, b, 0.015, POLE) for a, b in pairwise(cable)]
     plot.parts.append(merge(parts))

@@ -64,7 +64,9 @@ def _leg(height: float, side: int, angle: float, finish: Finish) -> Mesh:
     foot[2] = max(float(foot[2]), 0.03)
     shoe = box((0.15 * height, 0.05 * height, 0.05), (foot[0] + 0.04, foot[1], 0.0), finish)
     radius = 0.042 * height
-    return merge([rod(hip, knee, radius * 1.15, finish), rod(knee, foot, radius * 0.8, finish), shoe])
+    return merge(
+        [rod(hip, knee, radius * 1.15, finish), rod(knee, foot, radius * 0.8, finish), shoe]
+    )
 
 
 def _arm(height: float, side: int, angle: float, finish: Finish) -> Mesh:
@@ -72,7 +74,9 @@ def _arm(height: float, side: int, angle: float, finish: Finish) -> Mesh:
     elbow = shoulder + 0.17 * height * np.array([np.sin(angle), 0.0, -np.cos(angle)])
     fore = angle + 0.25
     hand = elbow + 0.2 * height * np.array([np.sin(fore), 0.0, -np.cos(fore)])
-    return merge([rod(shoulder, elbow, 0.03 * height, finish), rod(elbow, hand, 0.022 * height, SKIN)])
+    return merge(
+        [rod(shoulder, elbow, 0.03 * height, finish), rod(elbow, hand, 0.022 * height, SKIN)]
+    )
 
 
 def _carried(height: float, rng: np.random.Generator) -> Mesh:
@@ -99,7 +103,7 @@ def sitting(rng: np.random.Generator, seat: float, lean: float, reach: float) ->
     parts = [trunk, head]
     for side in (-1, 1):
         hand = np.array([reach, side * 0.25, seat + 0.1])
-        parts.append(rod(shoulder + [0, side * 0.2, 0], hand, 0.045, finish))
+        parts.append(rod(shoulder + np.array([0, side * 0.2, 0]), hand, 0.045, finish))
         knee = np.array([0.38, side * 0.12, seat - 0.12 + 0.06 * side])
         foot = np.array([0.22, side * 0.11, max(seat - 0.62 + 0.1 * side, 0.12)])
         parts += [rod((0, side * 0.1, seat), knee, 0.075, finish), rod(knee, foot, 0.055, finish)]
@@ -131,7 +135,9 @@ def draw_pram(rng: np.random.Generator) -> Model:
     if choice == 0:
         basin = blob((0.4, 0.22, 0.22), (0, 0, 0.75), finish, rng, 0.08)
         handle = rod((-0.3, 0, 0.8), (-0.65, 0, 1.05), 0.03, frame)
-        tyres = [disc_wheel((x, y, 0.14), 0.14, 0.04, frame) for x in (-0.3, 0.3) for y in (-0.22, 0.22)]
+        tyres = [
+            disc_wheel((x, y, 0.14), 0.14, 0.04, frame) for x in (-0.3, 0.3) for y in (-0.22, 0.22)
+        ]
         return of_parts("Pram", basin, handle, *tyres)
     if choice == 1:
         basket = box((0.75, 0.5, 0.45), (0, 0, 0.5), Finish(Surface.MESH_FENCE, 0.5), (1.1, 1.1))

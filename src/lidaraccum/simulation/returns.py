@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lidaraccum.simulation.scan import Encounter
 from lidaraccum.simulation.sensor import Sensor
-from lidaraccum.simulation.surfaces import LOSS_SHARE, ROUGHNESS_M, Surface
+from lidaraccum.simulation.surfaces import LOSS_SHARE, ROUGHNESS_M, WETTABLE
 
 Float = NDArray[np.float32]
 Bool = NDArray[np.bool_]
@@ -24,6 +25,7 @@ class Weather:
         near_share: Share of the pulses that a haze right before the sensor sends back.
         reach_m: How far the clutter is seen at all.
         fading_per_m: Loss of signal, per metre each way.
+        wet: Share of the light that wet ground throws back less than dry ground.
     """
 
     name: str = "clear"
@@ -31,17 +33,18 @@ class Weather:
     near_share: float = 0.0
     reach_m: float = 30.0
     fading_per_m: float = 0.0
+    wet: float = 0.0
 
 
 def draw_weather(name: str, rng: np.random.Generator) -> Weather:
     """Weather of a name, as thick as drawn."""
-    thick = float(rng.uniform(0.2, 1.0))
+    thick, wet = float(rng.uniform(0.15, 1.0)), float(rng.uniform(0.0, 0.97))
     if name == "rain":
-        return Weather(name, 0.0015 * thick, 0.004 * thick, 25.0, 0.002 * thick)
+        return Weather(name, 0.0015 * thick, 0.004 * thick, 25.0, 0.003 * thick, 0.5 + 0.5 * wet)
     if name == "snow":
-        return Weather(name, 0.006 * thick, 0.01 * thick, 18.0, 0.004 * thick)
+        return Weather(name, 0.006 * thick, 0.01 * thick, 18.0, 0.004 * thick, 0.3 * wet)
     if name == "fog":
-        return Weather(name, 0.003 * thick, 0.12 * thick**2, 20.0, 0.03 * thick)
+        return Weather(name, 0.003 * thick, 0.1 * thick**2, 20.0, 0.07 * thick, wet)
     return Weather()
 
 
@@ -86,24 +89,21 @@ class Echoes:
 
 
 def measure(
-    distance: Float, surface: NDArray[np.uint8], reflectivity: Float, slant: Float,
-    sensor: Sensor, realism: Realism, bias: Float, rng: np.random.Generator,
-) -> Echoes:  # fmt: skip
-    """Turn exact distances into what the sensor reports.
+    met: Encounter, sensor: Sensor, realism: Realism, bias: Float, rng: np.random.Generator
+) -> Echoes:
+    """Turn what the rays met into what the sensor reports.
 
     Args:
-        distance: (C, B) metres, inf where nothing was hit.
-        surface: (C, B) ``Surface`` of what was hit.
-        reflectivity: (C, B) 0..1.
-        slant: (C, B) cosine of the angle of incidence.
+        met: Exact distances and surfaces, (C, B).
         sensor: Its reach and noise.
         realism: What to apply.
         bias: (B,) metres each beam is always off by.
         rng: The frame's own.
     """
+    distance, surface, slant = met.distance, met.surface, met.slant
     hit = np.isfinite(distance)
     safe = np.where(hit, distance, np.float32(1.0))
-    signal = _signal(safe, reflectivity, slant, sensor, realism)
+    signal = _signal(safe, met, sensor, realism)
     lost = ~hit | (distance > sensor.max_range_m) | (distance < sensor.min_range_m)
     if realism.faint:
         lost |= rng.random(distance.shape, dtype=np.float32) * (signal**2 + 0.06) > signal**2 * 1.1
@@ -114,8 +114,10 @@ def measure(
         lost |= rng.random(distance.shape, dtype=np.float32) < realism.drop
     measured = safe
     if realism.noise > 0:
-        rough = ROUGHNESS_M[surface] / np.maximum(slant, np.float32(0.15))
-        sigma = np.sqrt(np.float32(sensor.range_noise_m) ** 2 + rough**2) * np.float32(realism.noise)
+        rough = ROUGHNESS_M[surface] / np.maximum(slant, np.float32(0.3))
+        sigma = np.sqrt(np.float32(sensor.range_noise_m) ** 2 + rough**2) * np.float32(
+            realism.noise
+        )
         measured = safe + sigma * rng.standard_normal(distance.shape, dtype=np.float32)
         measured += bias * np.float32(realism.noise)
     mixed = np.zeros(distance.shape, dtype=np.bool_)
@@ -125,20 +127,21 @@ def measure(
     if realism.weather.clutter_per_m > 0:
         measured, clutter = _cloud(np.where(lost, np.inf, measured), realism.weather, sensor, rng)
         lost &= ~clutter
-    intensity = np.clip(reflectivity * slant * np.where(clutter, 0.2, 1.0), 0.0, 1.0)
+    intensity = np.clip(met.reflectivity * slant * np.where(clutter, 0.2, 1.0), 0.0, 1.0)
     measured = np.where(lost, np.float32(np.inf), np.maximum(measured, 0.05)).astype(np.float32)
     return Echoes(measured, intensity.astype(np.float32), clutter, mixed & ~lost & ~clutter)
 
 
-def _signal(
-    distance: Float, reflectivity: Float, slant: Float, sensor: Sensor, realism: Realism
-) -> Float:
+def _signal(distance: Float, met: Encounter, sensor: Sensor, realism: Realism) -> Float:
     """Strength of an echo; 1 for a 10 % target straight ahead at the sensor's reach.
 
     Asphalt and the like throw light back at a slant better than Lambert's law has it: with its
     cosine the simulated ground ended at 30 m, that of recordings at 60 to 70 m; hence the root.
     """
-    strength = reflectivity * np.float32(10.0) * np.sqrt(np.maximum(slant, np.float32(0.003)))
+    strength = met.reflectivity * np.float32(10.0)
+    strength *= np.sqrt(np.maximum(met.slant, np.float32(0.003)))
+    if realism.weather.wet > 0:
+        strength[WETTABLE[met.surface]] *= np.float32(1 - realism.weather.wet)
     strength *= (np.float32(sensor.range_m) / np.maximum(distance, np.float32(1.0))) ** 2
     if realism.weather.fading_per_m > 0:
         strength *= np.exp(np.float32(-2 * realism.weather.fading_per_m) * distance)
@@ -180,6 +183,3 @@ def _cloud(
 def draw_bias(sensor: Sensor, rng: np.random.Generator) -> Float:
     """(B,) metres each beam of this very sensor is off by."""
     return (sensor.beam_bias_m * rng.standard_normal(sensor.beams)).astype(np.float32)
-
-
-CLUTTER = np.uint8(Surface.CLUTTER)

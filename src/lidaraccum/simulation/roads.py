@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,7 +98,7 @@ def circle(centre: Array, radius: float, start: float, turn: float) -> Path:
 def joined(pieces: list[Path]) -> Path:
     """One smooth path through the pieces; gaps are bridged by cubic curves."""
     points = [pieces[0].points]
-    for before, after in zip(pieces[:-1], pieces[1:], strict=True):
+    for before, after in pairwise(pieces):
         start, end = before.points[-1], after.points[0]
         gap = float(np.linalg.norm(end - start))
         if gap > 1.5:

@@ -46,7 +46,7 @@ class Rays:
 
 @dataclass(frozen=True, eq=False)
 class Encounter:
-    """What the rays meet, (C * B,) each.
+    """What the rays meet: arrays of one shape, (C, B) or flat.
 
     Attributes:
         distance: Float32 metres, inf for the sky.
@@ -61,6 +61,16 @@ class Encounter:
     reflectivity: Float
     slant: Float
     instance: NDArray[np.int32]
+
+    def shaped(self, shape: tuple[int, int]) -> Encounter:
+        """The same, column by column (C, B)."""
+        return Encounter(
+            self.distance.reshape(shape),
+            self.surface.reshape(shape),
+            self.reflectivity.reshape(shape),
+            self.slant.reshape(shape),
+            self.instance.reshape(shape),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,9 +118,7 @@ def aim(
     return Rays(times, azimuth, origin, direction, local, poses)
 
 
-def _jittered(
-    local: Float, sensor: Sensor, sigma: float, rng: np.random.Generator
-) -> Float:
+def _jittered(local: Float, sensor: Sensor, sigma: float, rng: np.random.Generator) -> Float:
     """Directions turned a little sideways and up; their length stays one to first order."""
     scale = np.float32(sigma * np.sqrt(12.0))
     sideways = scale * (rng.random(local.shape[:2], dtype=np.float32) - np.float32(0.5))
@@ -147,9 +155,7 @@ class Stage:
         shape = rays.origin.shape[:2]
         bundle = np.concatenate([rays.origin, rays.direction], axis=2).reshape(-1, 6)
         visits = [
-            visit
-            for actor in self.actors
-            for visit in self._visits(actor, rays, sensor, reach_m)
+            visit for actor in self.actors for visit in self._visits(actor, rays, sensor, reach_m)
         ]
         found = self._nearest(bundle, np.arange(len(bundle)), visits)
         gone = np.zeros(len(bundle), dtype=np.float32)
@@ -202,9 +208,7 @@ class Stage:
             found.instance[rows] = visit.instance
         return found
 
-    def _visits(
-        self, actor: Actor, rays: Rays, sensor: Sensor, reach_m: float
-    ) -> list[Visit]:
+    def _visits(self, actor: Actor, rays: Rays, sensor: Sensor, reach_m: float) -> list[Visit]:
         """The rays that may meet an actor, in the actor's own coordinates at each ray's time."""
         height = actor.model.size_lwh[2]
         radius = 0.5 * float(np.linalg.norm(actor.model.size_lwh)) + 0.05 + 0.1 * height

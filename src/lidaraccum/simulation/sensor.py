@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +64,7 @@ class Sensor:
         )
 
 
-def _of_degrees(name: str, elevation: NDArray[np.float64]) -> Sensor:
+def _of_degrees(name: str, elevation: NDArray[Any]) -> Sensor:
     ordered = np.deg2rad(np.sort(np.asarray(elevation, dtype=np.float64)))
     zeros = np.zeros(len(ordered))
     return Sensor(name, ordered, zeros, zeros)

@@ -73,7 +73,7 @@ ROUGHNESS_M = _table(
     {
         Surface.ROAD: 0.004,
         Surface.SIDEWALK: 0.006,
-        Surface.GRASS: 0.04,
+        Surface.GRASS: 0.025,
         Surface.GRAVEL: 0.02,
         Surface.HEDGE: 0.04,
         Surface.LEAVES: 0.02,
@@ -84,17 +84,5 @@ ROUGHNESS_M = _table(
 )
 """Scatter of the surface about its triangles, metres (one sigma, along the ray)."""
 
-MOVABLE = frozenset(
-    {
-        Surface.CAR_PAINT,
-        Surface.CAR_GLASS,
-        Surface.TYRE,
-        Surface.TRIM,
-        Surface.INTERIOR,
-        Surface.CLOTH,
-        Surface.SKIN,
-        Surface.CYCLE,
-        Surface.CARGO,
-    }
-)
-"""Surfaces that movable things are made of (some furniture is too: cargo on a kerb is still)."""
+WETTABLE = _table(0.0, {Surface.ROAD: 1.0, Surface.SIDEWALK: 1.0, Surface.GRAVEL: 1.0}) > 0
+"""Ground that turns into a mirror when it is wet."""

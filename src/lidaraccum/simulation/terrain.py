@@ -79,12 +79,14 @@ def shape_terrain(network: Network, way: Array, rng: np.random.Generator) -> Ter
     y = low[1] + CELL_M * np.arange(shape[1])
     places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=2).reshape(-1, 2)
     kerb, walk = network.kerb_distance(places), network.walk_distance(places)
-    heights = _rolling(places, rng) + _crown(network, kerb, rng) + _banks(network, places, walk, rng)
+    heights = (
+        _rolling(places, rng) + _crown(network, kerb, rng) + _banks(network, places, walk, rng)
+    )
     for island in network.islands:
         gap = np.linalg.norm(places - island[:2], axis=1)
         heights += rng.uniform(0, 1.5) * np.clip(1 - gap / island[2], 0, 1)
-    fields = (values.reshape(shape) for values in (heights, kerb, walk))
-    return Terrain(low, *fields, float(rng.choice([0.05, 0.1, 0.13, 0.16])))
+    kerb_m = float(rng.choice([0.05, 0.1, 0.13, 0.16]))
+    return Terrain(low, heights.reshape(shape), kerb.reshape(shape), walk.reshape(shape), kerb_m)
 
 
 def _rolling(places: Array, rng: np.random.Generator) -> Array:
@@ -149,7 +151,12 @@ def corners_of(places: Array, yaw: Array, size: tuple[float, float]) -> Array:
     ahead = 0.5 * size[0] * np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
     left = 0.5 * size[1] * np.stack([-np.sin(yaw), np.cos(yaw)], axis=1)
     return np.stack(
-        [places + ahead + left, places + ahead - left, places - ahead + left, places - ahead - left],
+        [
+            places + ahead + left,
+            places + ahead - left,
+            places - ahead + left,
+            places - ahead - left,
+        ],
         axis=1,
     )
 

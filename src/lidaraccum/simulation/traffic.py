@@ -62,7 +62,7 @@ class Traffic:
         self._parking()
         return tuple(self.actors)
 
-    # -- admission ---------------------------------------------------------------------------------
+    # -- admission --
 
     def admit(self, model: Model, way: Way, margin: float = 0.25, *, on_road: bool = True) -> bool:
         """Let a mover in, unless it would touch another one or, off the road, what stands."""
@@ -92,7 +92,7 @@ class Traffic:
         gap = np.linalg.norm(flat[:, None, :2] - near[None, :, :2], axis=2)
         return bool(np.any(gap < flat[:, None, 2] + near[None, :, 2] + margin))
 
-    # -- lanes ---------------------------------------------------------------------------------------
+    # -- lanes --
 
     def _lane(self, lane: Lane, *, own: bool, jam: bool) -> None:
         """Vehicles following each other; in the ego's lane, ahead of it and behind it."""
@@ -112,7 +112,11 @@ class Traffic:
             if along - 0.5 * model.size_lwh[0] > first:
                 starts.append(along - 0.5 * model.size_lwh[0])
                 models.append(model)
-            gap = rng.uniform(1.5, 5) if jam else 3 + speed * rng.uniform(0.7, 1.8) + rng.exponential(sparse)
+            gap = (
+                rng.uniform(1.5, 5)
+                if jam
+                else 3 + speed * rng.uniform(0.7, 1.8) + rng.exponential(sparse)
+            )
             along -= model.size_lwh[0] + gap
         if models:
             self._column(lane, models, np.array(starts), speed, None, 0.0, jam=jam)
@@ -149,7 +153,13 @@ class Traffic:
         offset = 0.0
         for _ in range(4):
             model = self._vehicle(max(speed, lane.speed_mps))
-            offset += nose + 0.5 * model.size_lwh[0] + 3 + speed * rng.uniform(0.6, 2.0) + rng.exponential(12 / (0.2 + self.busy))
+            offset += (
+                nose
+                + 0.5 * model.size_lwh[0]
+                + 3
+                + speed * rng.uniform(0.6, 2.0)
+                + rng.exponential(12 / (0.2 + self.busy))
+            )
             factor *= 1 + abs(rng.normal(0, 0.03))
             ahead = own[0] + offset + factor * (own - own[0])
             if rng.random() < 0.3 + 0.7 * self.busy:
@@ -158,13 +168,18 @@ class Traffic:
         starts, models, along = [], [], float(own[0]) - 0.5 * EGO_LENGTH_M
         for _ in range(4):
             model = self._vehicle(max(speed, lane.speed_mps))
-            along -= 3 + speed * rng.uniform(0.7, 2.0) + rng.exponential(12 / (0.2 + self.busy)) + model.size_lwh[0]
+            along -= (
+                3
+                + speed * rng.uniform(0.7, 2.0)
+                + rng.exponential(12 / (0.2 + self.busy))
+                + model.size_lwh[0]
+            )
             starts.append(along + 0.5 * model.size_lwh[0])
             models.append(model)
         pace = Lane(lane.path, max(speed, 1.0))
         self._column(pace, models, np.array(starts), speed, own, EGO_LENGTH_M)
 
-    # -- beside the lanes ------------------------------------------------------------------------------
+    # -- beside the lanes --
 
     def _near(self, path: Path, spread: float = 45.0) -> float:
         """Metres along a path of some place not far from the ego."""
@@ -189,7 +204,9 @@ class Traffic:
         """One vehicle passing from one lane into the next."""
         rng, hand = self.rng, self.world.network.hand
         path = road.lane(0, hand) if rng.random() < 0.5 else road.oncoming(0, hand)
-        speeds = speed_profile(self.times, road.speed_mps * rng.uniform(1.0, 1.3), "accelerate", rng)
+        speeds = speed_profile(
+            self.times, road.speed_mps * rng.uniform(1.0, 1.3), "accelerate", rng
+        )
         along = self._near(path) + distance_of(self.times, speeds)
         begins, takes = rng.uniform(-2, self.times[-1]), rng.uniform(2.5, 4)
         share = np.clip((self.times - begins) / takes, 0, 1)
@@ -213,7 +230,9 @@ class Traffic:
     def _stroll(self, path: Path, start: float, company: int) -> None:
         """One or a few walking side by side."""
         rng = self.rng
-        pace = float(np.clip(rng.normal(1.35, 0.35), 0.6, 4.0)) * (2.2 if rng.random() < 0.07 else 1)
+        pace = float(np.clip(rng.normal(1.35, 0.35), 0.6, 4.0)) * (
+            2.2 if rng.random() < 0.07 else 1
+        )
         for index in range(company):
             model = self.world.catalogue.draw_any(WALK_CHANCES)
             speeds = speed_profile(self.times, pace, "cruise", rng)
@@ -232,7 +251,9 @@ class Traffic:
     def _squares(self) -> None:
         """Across open squares, parks and yards, in any direction."""
         rng, network = self.rng, self.world.network
-        spots = [square for square in network.squares for _ in range(rng.poisson(4 + 10 * self.busy))]
+        spots = [
+            square for square in network.squares for _ in range(rng.poisson(4 + 10 * self.busy))
+        ]
         loose = rng.poisson(2.0 * WALKERS[network.kind] * self.busy)
         spots += [np.array([*self.focus, 35.0]) for _ in range(loose)]
         for x, y, radius in spots:
@@ -252,7 +273,12 @@ class Traffic:
             turn = float(heading) + rng.uniform(0.6, 2.5) * -side
             bend = rng.uniform(-1, 1) / 7
             path = _arc(start, turn, bend, 14.0)
-            speeds = speed_profile(self.times, rng.uniform(0.7, 3), str(rng.choice(["cruise", "pull away", "brake"])), rng)
+            speeds = speed_profile(
+                self.times,
+                rng.uniform(0.7, 3),
+                str(rng.choice(["cruise", "pull away", "brake"])),
+                rng,
+            )
             along = 1.0 + distance_of(self.times, speeds)
             model = self.world.catalogue.draw_any({"car": 8, "van": 1, "oddity": 1})
             self.admit(model, Way(path, along, np.zeros(len(along)), bool(rng.random() < 0.5)))
@@ -268,7 +294,9 @@ def _discs(places: Array, yaw: Array, length: float, width: float) -> Array:
     """(P, D, 3) discs that cover a rectangle at each of P places."""
     radius = 0.5 * min(length, width) * 1.05
     count = int(np.clip(np.ceil(length / max(width, 0.3)), 1, 7))
-    along = np.linspace(-0.5, 0.5, count) * max(length - 2 * radius, 0.0) if count > 1 else np.zeros(1)
+    along = (
+        np.linspace(-0.5, 0.5, count) * max(length - 2 * radius, 0.0) if count > 1 else np.zeros(1)
+    )
     ahead = np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
     discs = np.empty((len(places), count, 3))
     discs[:, :, :2] = places[:, None] + along[:, None] * ahead[:, None]

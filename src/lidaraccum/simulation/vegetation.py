@@ -147,5 +147,6 @@ def hedge(line: Array, rng: np.random.Generator) -> Mesh:
     centres = base + (spot[:, :1] * width * out[:, :1]) * left[low]
     centres[:, 2] += spot[:, 1] * height * out[:, 1]
     ends = [fan(ring[0], leaf), fan(ring[-1], leaf)]
-    return merge([grid(ring, leaf), *ends, flakes(centres, rng.uniform(0.05, 0.16, count), leaf, rng)])
-
+    return merge(
+        [grid(ring, leaf), *ends, flakes(centres, rng.uniform(0.05, 0.16, count), leaf, rng)]
+    )

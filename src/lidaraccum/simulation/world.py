@@ -13,9 +13,10 @@ from lidaraccum.simulation.mesh import Mesh, merge
 from lidaraccum.simulation.overhead import build_overhead
 from lidaraccum.simulation.plot import Plot, Still
 from lidaraccum.simulation.roads import Network
-from lidaraccum.simulation.streets import StreetBuilder
-from lidaraccum.simulation.vegetation import draw_tree
+from lidaraccum.simulation.site import Site
+from lidaraccum.simulation.streets import line_road
 from lidaraccum.simulation.terrain import Terrain, ground_mesh, kerb_mesh, shape_terrain
+from lidaraccum.simulation.vegetation import draw_tree
 
 Array = NDArray[np.float64]
 
@@ -55,11 +56,11 @@ def build_world(network: Network, reach_m: float, rng: np.random.Generator) -> W
     terrain = shape_terrain(network, network.ego.at(along)[0], rng)
     plot, catalogue = Plot(network, terrain, rng), Catalogue(rng)
     build_overhead(plot, network.kind, network.ego_start)
-    builder = StreetBuilder(plot, catalogue)
-    _fill_squares(plot, builder)
-    _plant_islands(plot, builder)
+    site = Site(plot, catalogue)
+    _fill_squares(plot, site)
+    _plant_islands(plot, site)
     for road in network.roads:
-        builder.line_road(road, network.kind)
+        line_road(site, road, network.kind)
     ground = [ground_mesh(terrain, network, rng), kerb_mesh(terrain, network, rng)]
     background = merge([*ground, *plot.parts])
     parked = [still.model.mesh.posed(still.world_from_object) for still in plot.stills]
@@ -69,7 +70,7 @@ def build_world(network: Network, reach_m: float, rng: np.random.Generator) -> W
     return World(network, terrain, mesh, ids, tuple(plot.stills), plot.discs.copy(), catalogue)
 
 
-def _fill_squares(plot: Plot, builder: StreetBuilder) -> None:
+def _fill_squares(plot: Plot, site: Site) -> None:
     """Stalls, benches, trees, parked things and people standing on open squares."""
     rng = plot.rng
     for x, y, radius in plot.network.squares:
@@ -79,14 +80,14 @@ def _fill_squares(plot: Plot, builder: StreetBuilder) -> None:
         makers = (*CAR_SIZED, *KERB_SIDE, draw_tree, draw_tree, draw_tree)
         for place in places:
             maker = makers[int(rng.integers(len(makers)))]
-            plot.scatter(builder.some(maker), place[None], rng.uniform(0, 6.28, 1), 0.8)
+            plot.scatter(site.some(maker), place[None], rng.uniform(0, 6.28, 1), 0.8)
         chances = {"pedestrian": 8.0, "bicycle": 3, "car": 2, "van": 1, "oddity": 1.5, "pram": 1}
         for place in np.array([x, y]) + rng.uniform(-0.8, 0.8, (rng.poisson(8), 2)) * radius:
             if plot.off_road(place[None], 2.5)[0]:
-                plot.park(builder.catalogue.draw_any(chances), place, rng.uniform(0, 6.28))
+                plot.park(site.catalogue.draw_any(chances), place, rng.uniform(0, 6.28))
 
 
-def _plant_islands(plot: Plot, builder: StreetBuilder) -> None:
+def _plant_islands(plot: Plot, site: Site) -> None:
     """Trees, bushes and a monument in the middle of a roundabout."""
     rng = plot.rng
     for x, y, radius in plot.network.islands:
@@ -94,4 +95,4 @@ def _plant_islands(plot: Plot, builder: StreetBuilder) -> None:
             angle, out = rng.uniform(0, 2 * np.pi), rng.uniform(0, 0.7) * radius
             place = np.array([x + out * np.cos(angle), y + out * np.sin(angle)])
             maker = (draw_tree, CAR_SIZED[int(rng.integers(len(CAR_SIZED)))])[int(rng.integers(2))]
-            plot.scatter(builder.some(maker), place[None], rng.uniform(0, 6.28, 1), 0.5)
+            plot.scatter(site.some(maker), place[None], rng.uniform(0, 6.28, 1), 0.5)
