@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-from plyfile import PlyData, PlyElement, PlyElementParseError, PlyListProperty, PlyParseError
+from numpy.typing import NDArray
+from plyfile import PlyData, PlyElementParseError, PlyListProperty, PlyParseError
 
 from lidaraccum.errors import InputError
 from lidaraccum.io.columns import Columns, columns_of_names, native, readable
+from lidaraccum.io.ply_ascii import read_ascii_vertices
 
 SCALAR_PREFIX = "scalar_"
 """CloudCompare's mark of a scalar field; ``scalar_X`` is attribute ``X``."""
@@ -20,6 +22,9 @@ def read_ply(path: Path) -> Columns:
     Raises:
         InputError: Not a PLY file, truncated, or without vertices.
     """
+    vertices = read_ascii_vertices(path)
+    if vertices is not None:
+        return columns_of_names(path, bare_names(vertices, list(vertices.dtype.names or ())))
     with readable(path):
         try:
             data = PlyData.read(str(path))
@@ -30,18 +35,17 @@ def read_ply(path: Path) -> Columns:
     vertex = next((element for element in data.elements if element.name == "vertex"), None)
     if vertex is None:
         raise InputError(f"{path} is a PLY file without vertices")
-    columns = columns_of_names(path, scalar_columns(vertex))
+    scalars = [p.name for p in vertex.properties if not isinstance(p, PlyListProperty)]
+    columns = columns_of_names(path, bare_names(vertex.data, scalars))
     return Columns(columns.xyz, columns.attributes, warnings=left_out(path, data))
 
 
-def scalar_columns(vertex: PlyElement) -> dict[str, np.ndarray]:
-    """The vertex's scalar properties (N,) by name, less CloudCompare's prefix."""
-    properties = [p.name for p in vertex.properties if not isinstance(p, PlyListProperty)]
-    taken = set(properties)
+def bare_names(record: NDArray[Any], names: list[str]) -> dict[str, NDArray[Any]]:
+    """The named fields (N,) of a structured array, less CloudCompare's prefix."""
     by_name = {}
-    for name in properties:
+    for name in names:
         bare = name.removeprefix(SCALAR_PREFIX)
-        by_name[bare if bare and bare not in taken else name] = native(vertex.data[name])
+        by_name[bare if bare and bare not in names else name] = native(record[name])
     return by_name
 
 
