@@ -116,6 +116,13 @@ def test_five_fields_without_a_name_are_pointed_out(tmp_path: Path) -> None:
         read_bin(path)
 
 
+def test_five_fields_are_noticed_even_when_four_would_divide(tmp_path: Path, cloud: Cloud) -> None:
+    table = np.column_stack([cloud(), np.arange(200) / 7, np.arange(200) % 32])
+    table.astype("<f4").tofile(tmp_path / "a.bin")
+    with pytest.raises(InputError, match="looks like 5 fields"):
+        read_bin(tmp_path / "a.bin")
+
+
 def write_las(path: Path, points: NDArray[Any], version: str, form: int) -> laspy.LasData:
     header = laspy.LasHeader(version=version, point_format=form)
     header.scales, header.offsets = [0.001] * 3, [10.0, 20.0, 0.0]

@@ -113,6 +113,26 @@ def test_nothing_there_is_said(tmp_path: Path) -> None:
             open_sequence(absent)
 
 
+def test_a_broken_link_is_a_missing_frame(folder: Folder) -> None:
+    place = folder(["0.bin", "1.bin"])
+    (place / "2.bin").symlink_to(place / "gone.bin")
+    with pytest.raises(MissingInputError, match=r"2\.bin does not exist"):
+        open_sequence(place)
+
+
+@pytest.mark.parametrize("meta", ['{"hz": 0}', '{"hz": "fast"}', '{"times": ["a"]}', "{", "[]"])
+def test_a_meta_file_that_makes_no_sense_is_refused(folder: Folder, meta: str) -> None:
+    root = folder(["0.bin"], "frames")
+    (root / "meta.json").write_text(meta)
+    with pytest.raises(InputError, match=r"meta\.json"):
+        open_sequence(root)
+
+
+def test_frames_one_folder_further_down_are_pointed_at(folder: Folder) -> None:
+    with pytest.raises(MissingInputError, match="its folder drive_7 holds frames"):
+        open_sequence(folder(["0.bin"], "drive_7"))
+
+
 def test_one_frame_opens_but_is_not_enough(folder: Folder) -> None:
     sequence = open_sequence(folder(["0.bin"]) / "0.bin")
     assert sequence.info.frames == 1

@@ -293,6 +293,12 @@ def test_an_existing_output_is_refused_unless_asked(tmp_path: Path, accumulated:
     assert len(read_cloud(path)) == 9
 
 
+def test_a_directory_is_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / "out.ply").mkdir()
+    with pytest.raises(OutputError, match="directory"):
+        open_writer(tmp_path / "out.ply", WriterSettings(overwrite=True))
+
+
 def test_an_unknown_suffix_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match=r"\.ply"):
         open_writer(tmp_path / "out.xyz")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lidaraccum.errors import InputError
 from lidaraccum.io.columns import Columns, columns_of_names, readable
@@ -14,6 +15,7 @@ KITTI_FIELDS = ("x", "y", "z", "intensity")
 NUSCENES_FIELDS = ("x", "y", "z", "intensity", "ring")
 NUSCENES_SUFFIX = ".pcd.bin"
 BYTES_PER_VALUE = 4
+SAMPLE_VALUES = 500
 
 
 def read_bin(path: Path, fields: Sequence[str] = ()) -> Columns:
@@ -31,7 +33,13 @@ def read_bin(path: Path, fields: Sequence[str] = ()) -> Columns:
     with readable(path):
         size = path.stat().st_size
         check_size(path, size, names, given=bool(fields))
-        values = np.fromfile(path, dtype="<f4").reshape(-1, len(names))
+        flat = np.fromfile(path, dtype="<f4")
+    if not fields and names == KITTI_FIELDS and has_ring_column(flat):
+        raise InputError(
+            f"{path} looks like 5 fields a point, the last one the ring, not KITTI's 4",
+            hint="name them with --bin-fields x,y,z,intensity,ring",
+        )
+    values = flat.reshape(-1, len(names))
     by_name = {name: np.ascontiguousarray(values[:, column]) for column, name in enumerate(names)}
     return columns_of_names(path, by_name)
 
@@ -39,6 +47,18 @@ def read_bin(path: Path, fields: Sequence[str] = ()) -> Columns:
 def default_fields(path: Path) -> tuple[str, ...]:
     """What the file's name promises."""
     return NUSCENES_FIELDS if path.name.lower().endswith(NUSCENES_SUFFIX) else KITTI_FIELDS
+
+
+def has_ring_column(flat: NDArray[np.float32]) -> bool:
+    """Whether every fifth value is a small whole number, not always the same.
+
+    KITTI's four fields, read five by five, put coordinates there.
+    """
+    if len(flat) % len(NUSCENES_FIELDS) or len(flat) < SAMPLE_VALUES:
+        return False
+    fifth = flat[:SAMPLE_VALUES].reshape(-1, len(NUSCENES_FIELDS))[:, -1]
+    whole = (fifth >= 0) & (fifth < 256) & (fifth == np.floor(fifth))
+    return bool(whole.all() and fifth.min() < fifth.max())
 
 
 def check_size(path: Path, size: int, names: Sequence[str], *, given: bool) -> None:

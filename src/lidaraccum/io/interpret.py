@@ -26,6 +26,7 @@ GEOREFERENCED_M = 2000.0
 COMPACT_M = 1000.0
 FARTHEST_MEDIAN_RANGE_M = 1000.0
 NEAREST_MEDIAN_RANGE_M = 0.5
+NOISE_RANGE = 1e7
 SAMPLE = 20_000
 
 
@@ -111,9 +112,11 @@ def origin_of(returned: NDArray[Any], name: str) -> NDArray[np.float64]:
     if np.abs(centre).max() > GEOREFERENCED_M and spread < COMPACT_M:
         return np.round(centre)
     if median_range > FARTHEST_MEDIAN_RANGE_M and spread > COMPACT_M / 2:
+        seem = "the coordinates seem to be millimetres; convert them to metres"
+        noise = "these seem to be no coordinates; if it is a .bin file, name its --bin-fields"
         raise InputError(
-            f"{name} has a median range of {median_range:.0f}: no LiDAR measures that in metres",
-            hint="the coordinates seem to be millimetres; convert them to metres",
+            f"{name} has a median range of {median_range:.4g}: no LiDAR measures that in metres",
+            hint=seem if median_range < NOISE_RANGE else noise,
         )
     if median_range < NEAREST_MEDIAN_RANGE_M:
         raise InputError(

@@ -177,7 +177,7 @@ def write_labels(path: Path, labels: Labels) -> None:
     if labels.points_at_stamp is not None:
         arrays["points_at_stamp"] = np.asarray(labels.points_at_stamp, np.float32)
     with path.open("wb") as file:
-        np.savez_compressed(file, allow_pickle=False, **arrays)
+        np.savez_compressed(file, **arrays)
 
 
 def boxes_entry(index: int, stamp: float, boxes: tuple[Box, ...]) -> dict[str, Any]:

@@ -108,6 +108,8 @@ def recognise(source: Source) -> Layout:
         paths = checked_paths(source)
         return Layout("list of paths", paths[0].stem if paths else "list", paths)
     path = Path(source)
+    if not str(source):
+        raise MissingInputError("no source was named")
     if path.is_dir():
         return layout_of_folder(path)
     if path.exists():
@@ -151,7 +153,8 @@ def labelled_layout(folder: Path) -> Layout:
     """Our own: frames/, labels/NNNNNN.npz, poses.txt, boxes.json, meta.json."""
     meta = read_meta(folder / "meta.json")
     times = first_file(folder, "times.txt", "timestamps.txt")
-    stamps = np.array(meta["times"], dtype=np.float64) if "times" in meta else None
+    stamps = numbers_of_meta(folder / "meta.json", meta, "times")
+    rate_hz = numbers_of_meta(folder / "meta.json", meta, "hz")
     stamps_from = "meta.json" if stamps is not None else ""
     if times and stamps is None:
         stamps, stamps_from = read_times(times), times.name
@@ -163,7 +166,7 @@ def labelled_layout(folder: Path) -> Layout:
         frames_in(folder / "frames"),
         stamps=stamps,
         stamps_from=stamps_from,
-        rate_hz=float(meta["hz"]) if "hz" in meta else None,
+        rate_hz=None if rate_hz is None else float(rate_hz[0]),
         poses_file=first_file(folder, "poses.txt", "poses.tum"),
         labels=labels if has_labels else None,
         label_kind=NPZ_LABELS if has_labels else "",
@@ -238,6 +241,23 @@ def read_meta(path: Path) -> dict[str, Any]:
     if not isinstance(meta, dict):
         raise InputError(f"{path} is not a JSON object")
     return meta
+
+
+def numbers_of_meta(path: Path, meta: dict[str, Any], key: str) -> NDArray[np.float64] | None:
+    """An entry's numbers (M,), or None when meta.json does not have it.
+
+    Raises:
+        InputError: They are no numbers, or the rate is not positive.
+    """
+    if key not in meta:
+        return None
+    try:
+        numbers = np.atleast_1d(np.array(meta[key], dtype=np.float64))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{path}: {key} holds something that is no number") from error
+    if numbers.ndim != 1 or (key == "hz" and not (len(numbers) == 1 and numbers[0] > 0)):
+        raise InputError(f"{path}: {key} makes no sense: {meta[key]!r:.50}")
+    return numbers
 
 
 def checked(layout: Layout) -> Layout:

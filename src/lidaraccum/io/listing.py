@@ -33,7 +33,8 @@ def frames_in(folder: Path) -> tuple[Path, ...]:
     """Files of the known formats right in a folder, naturally sorted."""
     with readable(folder):
         found = [p for p in folder.iterdir() if format_of(p) and not p.name.startswith(".")]
-    return tuple(sorted((p for p in found if p.is_file()), key=natural_key))
+    # A broken link stays: it is a frame that is missing, not one that never was.
+    return tuple(sorted((p for p in found if not p.is_dir()), key=natural_key))
 
 
 def frames_of_glob(pattern: str) -> tuple[Path, ...]:

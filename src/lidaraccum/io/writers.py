@@ -55,6 +55,8 @@ class CloudWriter:
     """
 
     def __init__(self, path: Path, settings: WriterSettings) -> None:
+        if path.is_dir():
+            raise OutputError(f"{path} is a directory, not a file to replace")
         self._path = path
         self._settings = settings
         self._temporary = prepare(path, settings.overwrite)
