@@ -231,3 +231,36 @@ def test_what_the_system_refuses_is_an_input_error(
     monkeypatch.setattr(Path, "stat", refuse)
     with pytest.raises(InputError, match="permission denied"):
         read_columns(tmp_path / name)
+
+
+def whole_file(path: Path, points: NDArray[np.float32]) -> None:
+    if path.suffix == ".ply":
+        write_ply(path, ply_record(points))
+    elif path.suffix == ".las":
+        write_las(path, points, "1.4", 6)
+    elif path.suffix == ".npy":
+        np.save(path, points)
+    else:
+        np.savez_compressed(path, points=points)
+
+
+@pytest.mark.filterwarnings("ignore:overflow encountered:RuntimeWarning")
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("name", ["a.ply", "a.las", "a.npy", "a.npz"])
+def test_a_damaged_file_is_read_or_refused_and_nothing_else(
+    tmp_path: Path, cloud: Cloud, name: str, seed: int
+) -> None:
+    path = tmp_path / name
+    whole_file(path, cloud())
+    content = bytearray(path.read_bytes())
+    rng = np.random.default_rng(seed)
+    for place in rng.integers(0, min(len(content), 400), 4):
+        content[place] = rng.integers(0, 256)
+    path.write_bytes(content)
+    said, shape = name, (3,)
+    try:
+        shape = read_columns(path).xyz.shape[1:]
+    except InputError as error:
+        said = str(error)
+    assert name in said
+    assert shape == (3,)

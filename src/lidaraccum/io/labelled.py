@@ -165,7 +165,7 @@ def write_las_frame(path: Path, frame: Frame, columns: Mapping[str, NDArray[Any]
 
 def write_labels(path: Path, labels: Labels) -> None:
     """The truth about each point, compressed."""
-    arrays: dict[str, NDArray[Any]] = {
+    arrays: dict[str, Any] = {
         "instance": labels.instance.astype(np.int32),
         "dynamic": labels.dynamic,
         "foreground": labels.foreground,

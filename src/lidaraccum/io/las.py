@@ -20,6 +20,8 @@ WKT_RECORD, WKT_MATH_RECORD = 2112, 2111
 GEOTIFF_DIRECTORY = 34735
 logger = logging.getLogger(__name__)
 
+DAMAGE = (LaspyException, ValueError, RuntimeError, OverflowError, MemoryError, struct.error)
+"""What laspy and lazrs raise on a damaged file; counts made of noise ask for too much memory."""
 POSITION = ("X", "Y", "Z")
 
 
@@ -35,7 +37,7 @@ def read_las(path: Path) -> Columns:
             with laspy.open(path) as reader:
                 points = reader.read_points(-1)
                 header = reader.header
-        except (LaspyException, ValueError, RuntimeError, struct.error) as error:
+        except DAMAGE as error:
             raise unreadable(path, error) from error
     if len(points) != header.point_count:
         raise unreadable(path, f"{header.point_count} points promised, {len(points)} found")
@@ -86,7 +88,8 @@ def check_header(path: Path) -> None:
 def unreadable(path: Path, reason: object) -> InputError:
     """The error for a body that laspy cannot read through."""
     size = path.stat().st_size
-    return InputError(f"{path} is truncated or damaged at its {size} bytes: {reason}")
+    said = reason if isinstance(reason, str) else repr(reason)
+    return InputError(f"{path} is truncated or damaged at its {size} bytes: {said}")
 
 
 def projection_vlrs(header: Any) -> tuple[RawVlr, ...]:
@@ -129,6 +132,6 @@ def read_reference(path: Path) -> LasReference:
                 has_keys = any(vlr.record_id == GEOTIFF_DIRECTORY for vlr in vlrs)
                 wkt = wkt_of(vlrs) or (wkt_of_keys(header) if has_keys else None)
                 is_standard = header.global_encoding.gps_time_type == GpsTimeType.STANDARD
-        except (LaspyException, ValueError, RuntimeError, struct.error) as error:
+        except DAMAGE as error:
             raise unreadable(path, error) from error
     return LasReference(wkt, vlrs, is_standard)

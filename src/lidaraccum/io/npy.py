@@ -6,6 +6,7 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 from zipfile import BadZipFile
 
@@ -23,6 +24,19 @@ from lidaraccum.io.columns import (
     readable,
 )
 
+DAMAGE = (
+    ValueError,
+    KeyError,
+    EOFError,
+    BadZipFile,
+    zlib.error,
+    TokenError,
+    SyntaxError,
+    OverflowError,
+    MemoryError,
+    NotImplementedError,
+)
+"""What numpy and zipfile raise on a damaged file."""
 POINT_KEYS = ("points", "xyz", "positions")
 COLUMN_NAMES = ("x", "y", "z", "intensity", "ring")
 
@@ -79,7 +93,7 @@ def loaded(path: Path) -> Iterator[Any]:
             yield np.load(file, allow_pickle=False)
         except InputError:
             raise
-        except (ValueError, BadZipFile, EOFError, KeyError, zlib.error) as error:
+        except DAMAGE as error:
             size = path.stat().st_size
             raise InputError(f"{path} ({size} bytes) is no whole NumPy file: {error}") from error
 

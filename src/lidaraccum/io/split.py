@@ -9,12 +9,11 @@ from typing import Any
 
 import laspy
 import numpy as np
-from laspy.errors import LaspyException
 from numpy.typing import NDArray
 
 from lidaraccum.errors import InputError, SettingsError
 from lidaraccum.io.columns import Columns, readable
-from lidaraccum.io.las import check_header, columns_of_points, unreadable
+from lidaraccum.io.las import DAMAGE, check_header, columns_of_points, unreadable
 
 POINTS_AT_A_TIME = 1_000_000
 TIME_BIN_S = 1e-3
@@ -81,7 +80,7 @@ def opened(path: Path) -> Any:
     """A laspy reader; its complaints become `InputError`."""
     try:
         return laspy.open(path)
-    except (LaspyException, ValueError, RuntimeError) as error:
+    except DAMAGE as error:
         raise unreadable(path, error) from error
 
 
@@ -138,7 +137,7 @@ def pieces_of(path: Path, dimension: str) -> Iterator[NDArray[Any]]:
         try:
             for points in reader.chunk_iterator(POINTS_AT_A_TIME):
                 yield np.asarray(points[dimension])
-        except (LaspyException, ValueError, RuntimeError) as error:
+        except DAMAGE as error:
             raise unreadable(path, error) from error
 
 

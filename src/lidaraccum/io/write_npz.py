@@ -23,6 +23,7 @@ class NpzEncoder:
     def __init__(self, path: Path, first: Chunk) -> None:
         self._path = path
         self._folder = path.with_name(f"{path.name}-columns")
+        remove(self._folder)
         self._folder.mkdir()
         self._types = {name: values.dtype for name, values in columns_of(first).items()}
         self._files: dict[str, BinaryIO] = {
