@@ -17,11 +17,11 @@ def random_body(rng: np.random.Generator, surface: Surface) -> Mesh:
     """
     scale = float(np.exp(rng.uniform(np.log(0.35), np.log(1.8))))
     parts = []
-    for _ in range(int(rng.integers(1, 6))):
+    for number in range(int(rng.integers(1, 6))):
         finish = Finish(surface, float(rng.uniform(0.05, 0.8)))
-        size = scale * rng.uniform(0.3, 1.2, 3)
+        size = scale * rng.uniform(0.5 if number == 0 else 0.3, 1.2, 3)
         x, y = scale * rng.uniform(-0.5, 0.5, 2)
-        kind = int(rng.integers(4))
+        kind = int(rng.integers(4 if number else 3))
         if kind == 0:
             top = (float(rng.uniform(0.5, 1.0)), float(rng.uniform(0.5, 1.0)))
             part = box((size[0], size[1], size[2]), (0, 0, 0), finish, top)

@@ -15,6 +15,8 @@ from lidaraccum.simulation.roads import Network
 from lidaraccum.simulation.terrain import Terrain, attitude, corners_of
 
 Array = NDArray[np.float64]
+FOOT_M = 1.8
+"""What a thing has below this height must not stand in anyone's way."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,10 +100,11 @@ class Plot:
         keep = self.off_road(places, margin)
         for place, yaw in zip(places[keep], yaws[keep], strict=True):
             mesh = makers(self.rng)
-            foot = mesh.vertices[mesh.vertices[:, 2] < 1.5, :2]
-            reach = float(np.abs(foot).max()) if len(foot) else 1.0
-            if self.is_free(place, reach):
-                self.take(place, reach)
+            spots, radius = _footprint(mesh, place, float(yaw))
+            if not self.off_road(spots, min(margin, 0.3) + radius).all():
+                continue
+            if all(self.is_free(spot, radius) for spot in spots):
+                self.take(spots, radius)
                 self.put(mesh, place, float(yaw), 0.05)
 
     def run_barrier(
@@ -138,3 +141,23 @@ class Plot:
         pose = poses_of(centre, np.array([[yaw, pitch[0], roll[0]]]))[0]
         self.stills.append(Still(len(self.stills) + 1, model, pose))
         return True
+
+
+def _footprint(mesh: Mesh, place: Array, yaw: float) -> tuple[Array, float]:
+    """Discs that cover what a mesh takes up near the ground: centres (N, 2) and their radius."""
+    foot = mesh.vertices[mesh.vertices[:, 2] < FOOT_M, :2]
+    if not len(foot):
+        return place[None], 0.5
+    low, high = foot.min(axis=0).astype(np.float64), foot.max(axis=0).astype(np.float64)
+    size = high - low
+    longer = int(size[1] > size[0])
+    radius = 0.55 * float(size[1 - longer]) + 0.05
+    count = min(int(size[longer] / max(size[1 - longer], 0.3)) + 1, 6)
+    spots = np.repeat(0.5 * (low + high)[None], count, axis=0)
+    spread = 0.5 * max(float(size[longer]) - 2 * radius, 0.0)
+    spots[:, longer] += np.linspace(-spread, spread, count) if count > 1 else 0.0
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    turned = np.stack(
+        [cos * spots[:, 0] - sin * spots[:, 1], sin * spots[:, 0] + cos * spots[:, 1]], axis=1
+    )
+    return place + turned, radius

@@ -28,7 +28,7 @@ def training_settings(index: int, frames: int = TEST_FRAMES) -> DriveSettings:
     return DriveSettings(seed=index, frames=frames)
 
 
-def testing_settings(index: int, frames: int = TEST_FRAMES) -> DriveSettings:
+def held_out_settings(index: int, frames: int = TEST_FRAMES) -> DriveSettings:
     """Settings of test window ``index``: every sensor meets every speed, the rest is drawn.
 
     Raises:
@@ -45,6 +45,6 @@ def testing_settings(index: int, frames: int = TEST_FRAMES) -> DriveSettings:
     )
 
 
-def testing_windows(caster: RayCaster | None = None) -> Iterator[SimulatedSequence]:
+def held_out_windows(caster: RayCaster | None = None) -> Iterator[SimulatedSequence]:
     """The test set, one window after another, each simulated when asked for."""
-    return (simulate(testing_settings(index), caster) for index in range(TEST_WINDOWS))
+    return (simulate(held_out_settings(index), caster) for index in range(TEST_WINDOWS))
