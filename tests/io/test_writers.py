@@ -16,7 +16,7 @@ from laspy.header import GpsTimeType
 from plyfile import PlyData
 
 from lidaraccum.data.accumulation import AccumulatedFrame
-from lidaraccum.errors import OutputError, OutputExistsError, SettingsError
+from lidaraccum.errors import InputError, OutputError, OutputExistsError, SettingsError
 from lidaraccum.io.clouds import read_cloud
 from lidaraccum.io.columns import RawVlr
 from lidaraccum.io.sequences import open_sequence
@@ -277,10 +277,27 @@ def test_later_frames_fit_the_first_ones_columns(
 
 
 def test_an_empty_frame_is_no_obstacle(tmp_path: Path, accumulated: Make) -> None:
-    frames = [accumulated(0).select(np.zeros(50, dtype=np.bool_)), accumulated(1)]
+    unit = {"intensity": np.linspace(0, 1, 50, dtype=np.float32)}
+    frames = [accumulated(i, shift=UTM, attributes=unit) for i in range(2)]
+    frames[0] = frames[0].select(np.zeros(50, dtype=np.bool_))
     for suffix in SUFFIXES:
         cloud = read_cloud(write(tmp_path / f"out{suffix}", frames))
+        np.testing.assert_allclose(cloud.positions, frames[1].points, rtol=0, atol=5e-4)
+        scale = 65535 if suffix in (".las", ".laz") else 1
+        np.testing.assert_allclose(
+            cloud.attributes["intensity"] / scale, unit["intensity"], atol=1e-5
+        )
         np.testing.assert_array_equal(cloud.frame, np.full(50, 1))
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_cloud_of_no_points_is_a_whole_file(
+    tmp_path: Path, accumulated: Make, suffix: str
+) -> None:
+    nothing = accumulated().select(np.zeros(50, dtype=np.bool_))
+    path = write(tmp_path / f"out{suffix}", [nothing, nothing])
+    with pytest.raises(InputError, match="zero points"):
+        read_cloud(path)
 
 
 def test_an_existing_output_is_refused_unless_asked(tmp_path: Path, accumulated: Make) -> None:

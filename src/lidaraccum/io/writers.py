@@ -62,6 +62,7 @@ class CloudWriter:
         self._temporary = prepare(path, settings.overwrite)
         self._encoder: Encoder | None = None
         self._schema: Schema | None = None
+        self._empty: Chunk | None = None
         self._closed = False
         self.points = 0
 
@@ -73,9 +74,13 @@ class CloudWriter:
             if self._schema is None:
                 self._schema = self._fix_schema(frame)
             chunk = self._schema.chunk(frame)
-            if self._encoder is None:
+            # Offsets and scales come from the first points: an empty frame has none to say.
+            if self._encoder is None and len(chunk):
                 self._encoder = self._start(chunk, self._schema)
-            self._encoder.write(chunk)
+            if self._encoder is not None:
+                self._encoder.write(chunk)
+            elif self._empty is None:
+                self._empty = chunk
         self.points += len(chunk)
 
     def close(self) -> None:
@@ -86,18 +91,18 @@ class CloudWriter:
         """
         if self._closed:
             return
-        if self._encoder is None:
-            self.abandon()
-            raise OutputError(f"{self._path} is not written: there was no frame to write")
-        self._closed = True
         try:
             with writable(self._path):
+                if self._encoder is None and self._schema and self._empty is not None:
+                    self._encoder = self._start(self._empty, self._schema)
+                if self._encoder is None:
+                    raise OutputError(f"{self._path} is not written: there was no frame to write")
                 self._encoder.finish()
                 put_in_place(self._temporary, self._path)
         except BaseException:
-            self._encoder.abandon()
-            remove(self._temporary)
+            self.abandon()
             raise
+        self._closed = True
 
     def abandon(self) -> None:
         """Leave nothing."""
