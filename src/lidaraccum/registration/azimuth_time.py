@@ -26,6 +26,9 @@ SURFACE_M = 0.15
 """Frames are thinned to this before they are compared."""
 
 MAX_RANGE_M = 80.0
+LEAD = 1.2
+"""A seam must explain this many times as much as any other but its neighbours."""
+
 MAX_DISTANCE_M = 0.5
 MIN_SPREAD_M = 0.01
 
@@ -43,6 +46,28 @@ class Glimpse:
     points: NDArray[np.float64]
     world_from_sensor: rigid.Pose
     twist: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SweepHeight:
+    """How much of a frame interval one turn takes, judging by aligned frames.
+
+    Attributes:
+        share: About 1 for consecutive sweeps as measured, 0 where there is no motion inside.
+        sigma: Its standard error, matches taken as independent.
+    """
+
+    share: float
+    sigma: float
+
+    @property
+    def gain(self) -> float:
+        """Squared sigmas by which it differs from 0."""
+        return (self.share / self.sigma) ** 2
+
+    def turned(self, direction: int) -> SweepHeight:
+        """The same for time that runs this way around."""
+        return SweepHeight(self.share * direction, self.sigma)
 
 
 class AzimuthTime:
@@ -93,17 +118,30 @@ class AzimuthTime:
         self._matrix += matrix[6:, 6:] - cross.T @ np.linalg.solve(pose, cross)
         self._vector += vector[6:] - cross.T @ np.linalg.solve(pose, vector[:6])
 
-    def best_seam(self) -> tuple[Seam, float]:
-        """The seam that explains the distances best, and by how much (squared sigmas)."""
-        gains, heights = np.zeros(SECTORS), np.zeros(SECTORS)
-        for sector in range(SECTORS):
-            times = _sawtooth(sector)
-            curvature = float(times @ self._matrix @ times) + 1e-12
-            heights[sector] = -float(times @ self._vector) / curvature
-            gains[sector] = heights[sector] ** 2 * curvature
+    def best_seam(self) -> tuple[Seam | None, SweepHeight]:
+        """The seam that explains the distances best.
+
+        None where another one, not beside it, does nearly as well: nothing was seen to cross the
+        part of the turn between the two.
+        """
+        heights = [self._height(sector) for sector in range(SECTORS)]
+        gains = np.array([height.gain for height in heights])
         best = int(gains.argmax())
-        seam = Seam(2 * np.pi * best / SECTORS, 1 if heights[best] > 0 else -1)
-        return seam, float(gains[best])
+        apart = np.abs((np.arange(SECTORS) - best + SECTORS // 2) % SECTORS - SECTORS // 2)
+        is_alone = gains[apart > 1].max() * LEAD < gains[best]
+        direction = 1 if heights[best].share > 0 else -1
+        seam = Seam(2 * np.pi * best / SECTORS, direction)
+        return (seam if is_alone else None), heights[best].turned(direction)
+
+    def height_at(self, seam: Seam) -> SweepHeight:
+        """What the distances say of a seam that is known from elsewhere."""
+        sector = round(seam.azimuth_rad / (2 * np.pi) * SECTORS) % SECTORS
+        return self._height(sector).turned(seam.direction)
+
+    def _height(self, sector: int) -> SweepHeight:
+        times = _sawtooth(sector)
+        curvature = float(times @ self._matrix @ times) + 1e-12
+        return SweepHeight(-float(times @ self._vector) / curvature, curvature**-0.5)
 
 
 def _thinned(points: NDArray[np.float64], size_m: float) -> NDArray[np.float64]:

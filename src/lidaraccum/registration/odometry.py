@@ -25,6 +25,10 @@ from lidaraccum.registration.tracker import Tracker
 WINDOW = 5
 """Frames looked at together for the motion within a sweep."""
 
+MAX_OPENING_PASSES = 3
+SETTLED_M, SETTLED_RAD = 0.02, 0.001
+"""The first frames are solved again as long as the first motion changes by more."""
+
 Indexed = tuple[int, Frame]
 
 
@@ -93,17 +97,21 @@ class Odometry:
             self._pace.see(earlier.stamp, later.stamp)
         has_times = self._settings.deskew == "auto" and opening[0][1].time_offset is not None
         first_clock: SweepClock = TimedSweep() if has_times else Compensated()
-        first_pass = self._run(opening, first_clock, None)
-        if len(first_pass) < 2:
-            return first_pass
+        passed = self._run(opening, first_clock, None)
+        if len(passed) < 2:
+            return passed
         clock = self._look_at_sweep() or first_clock
-        twist = self._opening_twist(first_pass)
-        if clock == first_clock == Compensated() and self._is_steady(first_pass):
-            return first_pass
-        second_pass = self._run(opening, clock, twist)
-        if clock == first_clock and _mean_overlap(second_pass) < _mean_overlap(first_pass):
+        if clock == first_clock == Compensated() and self._is_steady(passed):
+            return passed
+        for _ in range(MAX_OPENING_PASSES):
+            twist = self._opening_twist(passed)
+            before, passed = passed, self._run(opening, clock, twist)
+            change = np.abs(self._opening_twist(passed) - twist)
+            if change[3:].max() < SETTLED_M and change[:3].max() < SETTLED_RAD:
+                break
+        if clock == first_clock and _mean_overlap(passed) < _mean_overlap(before):
             return self._run(opening, clock, None)
-        return second_pass
+        return passed
 
     def follow(self, index: int, raw: Frame) -> RegisteredFrame:
         """Register the next frame and add it to the map."""
@@ -161,13 +169,13 @@ class Odometry:
             raise InputError(f"there are only {len(self._given)} poses for more frames")
         return self._given[index]
 
-    def _opening_twist(self, first_pass: list[RegisteredFrame]) -> NDArray[np.float64]:
+    def _opening_twist(self, passed: list[RegisteredFrame]) -> NDArray[np.float64]:
         """Motion at the first frame: the first step, unless the next ones disagree with it."""
-        steps = self._step_twists(first_pass)
-        return steps[0] if self._is_steady(first_pass) else np.median(steps, axis=0)
+        steps = self._step_twists(passed)
+        return steps[0] if self._is_steady(passed) else np.median(steps, axis=0)
 
-    def _is_steady(self, first_pass: list[RegisteredFrame]) -> bool:
-        steps = self._step_twists(first_pass)
+    def _is_steady(self, passed: list[RegisteredFrame]) -> bool:
+        steps = self._step_twists(passed)
         allowed = 0.2 + 8.0 * self._pace.interval_s**2 * np.arange(1, len(steps) + 1)
         away = np.linalg.norm(steps[:, 3:] - np.median(steps, axis=0)[3:], axis=1)
         return bool((away < allowed).all())
