@@ -24,6 +24,7 @@ FLOOR_OF = {
     "evaluation": 5,
     "batch": 5,
     "cli": 6,
+    "__main__": 7,
 }
 
 HOMES_OF = {

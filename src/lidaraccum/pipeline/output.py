@@ -149,7 +149,12 @@ def accumulate_to_files(
     """
     check_outputs(output)
     accumulator = Accumulator(sequence, settings)
-    cloud_settings = WriterSettings(output.overwrite, sequence.crs_wkt, sequence.crs_vlrs)
+    cloud_settings = WriterSettings(
+        overwrite=output.overwrite,
+        crs_wkt=sequence.crs_wkt,
+        vlrs=sequence.crs_vlrs,
+        standard_gps_time=sequence.las_reference.standard_gps_time,
+    )
     poses, stamps = [], []
     with ExitStack() as stack:
         cloud = stack.enter_context(open_writer(output.path, cloud_settings))
