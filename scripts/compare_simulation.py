@@ -34,7 +34,7 @@ PAIRS = {
     "ouster_os1_128": ("OS1-128", "clear", ("straight", "crossing", "industrial", "square")),
 }
 HEADER = """\
-| recording | | lost | range 25 % | 50 % | 75 % | 95 % | under 2 m | ground | over 2 m | per pillar |
+| recording | | lost | 25 % | 50 % | 75 % | 95 % | < 2 m | ground | over 2 m | per pillar |
 |---|---|---|---|---|---|---|---|---|---|---|
 """
 PILLAR_M = 0.25
@@ -173,10 +173,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=SEEDS)
     arguments = parser.parse_args()
     arguments.output.mkdir(parents=True, exist_ok=True)
-    print(
-        "| recording | | lost | range 25 % | 50 % | 75 % | 95 % | under 2 m | within 0.3 m of the ground | over 2 m | per pillar |"
-    )
-    print("|---|---|---|---|---|---|---|---|---|---|---|")
+    sys.stdout.write(HEADER)
     for name, (sensor_name, _, _) in PAIRS.items():
         sensor = SENSORS[sensor_name]()
         sequence = open_sequence(arguments.recordings / name)

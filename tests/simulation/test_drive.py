@@ -5,19 +5,21 @@ from __future__ import annotations
 import hashlib
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
-import open3d as o3d
 import pytest
 from numpy.typing import NDArray
 
 from lidaraccum.data.sequence import LabelledSequence
 from lidaraccum.geometry.rigid import invert, transform
 from lidaraccum.simulation.drive import DriveSettings, SimulatedSequence, simulate
-from lidaraccum.simulation.mesh import Mesh
 from lidaraccum.simulation.surfaces import Surface
 
+Distance = Callable[..., NDArray[np.float64]]
 EXACT_M = 0.004
 """Rays and meshes are float32, a few hundred metres from their origin."""
 BUSY = DriveSettings(
@@ -28,16 +30,7 @@ BUSY = DriveSettings(
 
 @cache
 def drive(**changes: object) -> SimulatedSequence:
-    from dataclasses import replace
-
     return simulate(replace(BUSY, **changes))  # type: ignore[arg-type]
-
-
-def distance_to(mesh: Mesh, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    scene = o3d.t.geometry.RaycastingScene()
-    tensor = o3d.core.Tensor.from_numpy
-    scene.add_triangles(tensor(mesh.vertices), tensor(mesh.triangles.astype(np.uint32)))
-    return scene.compute_distance(tensor(points.astype(np.float32))).numpy()
 
 
 def in_world(sequence: SimulatedSequence, index: int) -> NDArray[np.float64]:
@@ -76,7 +69,9 @@ def test_is_a_labelled_sequence() -> None:
     ],
     ids=str,
 )
-def test_static_points_lie_on_the_worlds_surfaces(changes: dict[str, object]) -> None:
+def test_static_points_lie_on_the_worlds_surfaces(
+    changes: dict[str, object], distance_to: Distance
+) -> None:
     sequence = drive(**changes)
     for index in range(len(sequence)):
         labels = sequence.labels(index)
@@ -87,7 +82,7 @@ def test_static_points_lie_on_the_worlds_surfaces(changes: dict[str, object]) ->
         assert off.max() < 10 * EXACT_M
 
 
-def test_noise_is_as_large_as_the_sensor_says() -> None:
+def test_noise_is_as_large_as_the_sensor_says(distance_to: Distance) -> None:
     sequence = drive(exact=False, weather="clear", seed=6)
     labels, frame = sequence.labels(1), sequence[1]
     road = labels.annotated & np.isin(labels.semantic, [Surface.BUILDING, Surface.WALL])
@@ -97,7 +92,9 @@ def test_noise_is_as_large_as_the_sensor_says() -> None:
 
 
 @pytest.mark.parametrize("rolling", [True, False])
-def test_an_objects_points_lie_on_its_surface_by_its_true_motion(rolling: bool) -> None:
+def test_an_objects_points_lie_on_its_surface_by_its_true_motion(
+    rolling: bool, distance_to: Distance
+) -> None:
     sequence = drive(rolling_shutter=rolling)
     checked = 0
     for index in range(len(sequence)):
@@ -157,8 +154,6 @@ def test_another_process_makes_the_same_bytes() -> None:
         "from tests.simulation.test_drive import BUSY, digest, simulate\n"
         "print(digest(simulate(BUSY), 1))"
     )
-    from pathlib import Path
-
     root = Path(__file__).parents[2]
     answer = subprocess.run(
         [sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True

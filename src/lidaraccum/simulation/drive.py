@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.data.frame import Frame, Labels
-from lidaraccum.geometry.rigid import invert, transform
+from lidaraccum.geometry.rigid import invert
 from lidaraccum.simulation.actors import Actor
 from lidaraccum.simulation.ego import Ego, draw_body, draw_mount, drive_ego
 from lidaraccum.simulation.labelling import Movables, Seen, label
@@ -20,7 +20,7 @@ from lidaraccum.simulation.returns import Echoes, draw_bias, measure
 from lidaraccum.simulation.scan import Encounter, Rays, Solid, Stage, aim
 from lidaraccum.simulation.settings import DriveSettings, child, draw_drive
 from lidaraccum.simulation.surfaces import Surface
-from lidaraccum.simulation.sweep_truth import Moments, follow_actors
+from lidaraccum.simulation.sweep_truth import Sweep
 from lidaraccum.simulation.traffic import Traffic
 from lidaraccum.simulation.world import World, build_world
 
@@ -156,61 +156,55 @@ class SimulatedSequence:
         self, index: int, rays: Rays, offsets: Array, met: Encounter, echoes: Echoes
     ) -> tuple[Frame, Labels]:
         """The points in the frame's coordinates, and their labels."""
-        columns, beams = echoes.distance.shape
+        beams = self.drawn.sensor.beams
         distance = echoes.distance.ravel()
         back = np.isfinite(distance)
         kept = np.arange(len(distance)) if self.drawn.zeros else np.flatnonzero(back)
-        column, ring = kept // beams, kept % beams
-        came = back[kept]
-        places = self._places(index, rays, np.where(back, distance, 0).reshape(columns, beams))
-        points = places.reshape(-1, 3)[kept]
-        points[~came] = 0.0
-        frame = Frame(
-            points=points,
-            stamp=self.stamp(index),
-            intensity=np.where(came, echoes.intensity.ravel()[kept], np.float32(0)),
-            time_offset=offsets[column].astype(np.float32),
-            ring=ring.astype(np.int16),
-            name=f"{index:06d}",
-        )
+        column, ring, came = kept // beams, kept % beams, back[kept]
         seen = Seen(
             met.instance[kept],
             met.surface[kept],
             came & ~echoes.clutter.ravel()[kept],
             echoes.mixed.ravel()[kept],
         )
-        pose = self.world_from_sensor(np.array([self.stamp(index)]))[0]
-        reach = self.drawn.sensor.max_range_m + BOX_MARGIN_M
-        labels = label(seen, self.movables, self.stamp(index), pose, reach)
+        sweep = self._sweep(index, rays)
+        local = rays.local * np.where(back, distance, 0).reshape(echoes.distance.shape)[..., None]
+        local[..., 2] += self.drawn.sensor.height.astype(np.float32)
+        level = sweep.at_stamp(local).reshape(-1, 3)[kept]
+        level[~came] = 0.0
+        points = level
         if self.drawn.rolling_shutter and not self.drawn.compensated:
-            at_stamp = self._at_stamp(frame, rays, column, labels)
-            at_stamp[~came] = 0.0
-            labels = replace(labels, points_at_stamp=at_stamp)
+            points = self._mounted(local).reshape(-1, 3)[kept]
+            points[~came] = 0.0
+        frame = Frame(
+            points=points,
+            stamp=sweep.stamp,
+            intensity=np.where(came, echoes.intensity.ravel()[kept], np.float32(0)),
+            time_offset=offsets[column].astype(np.float32),
+            ring=ring.astype(np.int16),
+            name=f"{index:06d}",
+        )
+        reach = self.drawn.sensor.max_range_m + BOX_MARGIN_M
+        labels = label(seen, self.movables, sweep.stamp, sweep.world_from_frame, reach)
+        if self.drawn.rolling_shutter:
+            carried = sweep.carry(level, labels.instance, column, self.actors)
+            labels = replace(labels, points_at_stamp=carried)
         return frame, labels
 
-    def _at_stamp(
-        self, frame: Frame, rays: Rays, column: NDArray[np.int64], labels: Labels
-    ) -> NDArray[np.float32]:
-        """(N, 3) metres: where each point was at the stamp, in the frame's coordinates then."""
-        then = Moments(rays.times, self.world_from_sensor(rays.times), column)
-        world = then.to_world(frame.points)
-        follow_actors(world, labels.instance, then, frame.stamp, self.actors)
-        return transform(invert(labels.world_from_sensor), world).astype(np.float32)
+    def _sweep(self, index: int, rays: Rays) -> Sweep:
+        """The turn, from the sensor at each column to the frame's coordinates at the stamp."""
+        stamp = self.stamp(index)
+        world_from_frame = self.world_from_sensor(np.array([stamp]))[0]
+        return Sweep(
+            stamp, rays.times, invert(world_from_frame) @ rays.world_from_sensor, world_from_frame
+        )
 
-    def _places(self, index: int, rays: Rays, distance: NDArray[np.float32]) -> NDArray[np.float32]:
-        """(C, B, 3) float32 metres in the frame's coordinates, from distances (C, B)."""
-        points = rays.local * distance[..., None]
-        points[..., 2] += self.drawn.sensor.height.astype(np.float32)
-        frame_from_sensor = np.eye(4)[None]
-        mount = self.ego.vehicle_from_sensor
-        if self.drawn.compensated:
-            stamp_pose = self.ego.trajectory.poses_at(np.array([self.stamp(index)]))[0] @ mount
-            frame_from_sensor = invert(stamp_pose) @ rays.world_from_sensor
-        if self.drawn.vehicle_coordinates:
-            frame_from_sensor = mount @ frame_from_sensor
-        rotation = np.swapaxes(frame_from_sensor[:, :3, :3], 1, 2).astype(np.float32)
-        shift = frame_from_sensor[:, None, :3, 3].astype(np.float32)
-        return (points @ rotation + shift).astype(np.float32)
+    def _mounted(self, local: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Points (C, B, 3) from the sensor's coordinates to the frame's, as measured."""
+        if not self.drawn.vehicle_coordinates:
+            return local
+        mount = self.ego.vehicle_from_sensor.astype(np.float32)
+        return (local @ mount[:3, :3].T + mount[:3, 3]).astype(np.float32)
 
 
 def _before_own_car(met: Encounter, own: NDArray[np.float32], removed: bool) -> Encounter:

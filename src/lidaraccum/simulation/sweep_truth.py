@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,46 +15,51 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Moments:
-    """When each point was measured, and where the frame's coordinates were then.
+class Sweep:
+    """A turn of the sensor and the poses it was made from.
 
     Attributes:
+        stamp: Reference time, seconds.
         times: (C,) seconds of each column.
-        poses: (C, 4, 4) world from the frame's coordinates at those times.
-        column: (N,) which column each point was measured in.
+        frame_from_sensor: (C, 4, 4) or (1, 4, 4): from the sensor as each column was fired to the
+            frame's coordinates at the stamp.
+        world_from_frame: (4, 4) at the stamp.
     """
 
+    stamp: float
     times: Array
-    poses: Array
-    column: NDArray[np.int64]
+    frame_from_sensor: Array
+    world_from_frame: Array
 
-    def to_world(self, points: NDArray[Any]) -> Array:
-        """(N, 3) metres, world, of points (N, 3) as measured."""
-        return _each(self.poses[self.column], points.astype(np.float64))
+    def at_stamp(self, local: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Points (C, B, 3) in the sensor's coordinates, as if the sensor had stood still."""
+        rotation = np.swapaxes(self.frame_from_sensor[:, :3, :3], 1, 2).astype(np.float32)
+        shift = self.frame_from_sensor[:, None, :3, 3].astype(np.float32)
+        return (local @ rotation + shift).astype(np.float32)
 
+    def carry(
+        self, points: NDArray[np.float32], owners: NDArray[np.int32], column: NDArray[np.int64],
+        actors: Iterable[Actor],
+    ) -> NDArray[np.float32]:  # fmt: skip
+        """Take actors' points along by their own motion from when they were measured to the stamp.
 
-def follow_actors(
-    world: Array, instance: NDArray[np.int32], then: Moments, stamp: float, actors: Iterable[Actor]
-) -> None:
-    """Take actors' points from where they were measured to where they were at the stamp.
-
-    Args:
-        world: (N, 3) metres, changed in place.
-        instance: (N,) whose each point is.
-        then: When each was measured.
-        stamp: Seconds.
-        actors: What moves.
-    """
-    seen = set(np.unique(instance).tolist())
-    for actor in actors:
-        if actor.id not in seen:
-            continue
-        own = np.flatnonzero(instance == actor.id)
-        columns, place = np.unique(then.column[own], return_inverse=True)
-        world_from_actor = actor.trajectory.poses_at(np.append(then.times[columns], stamp))
-        motions = world_from_actor[-1] @ invert(world_from_actor[:-1])
-        world[own] = _each(motions[place], world[own])
-
-
-def _each(poses: Array, points: Array) -> Array:
-    return np.einsum("nij,nj->ni", poses[:, :3, :3], points) + poses[:, :3, 3]
+        Args:
+            points: (N, 3) metres, the frame's coordinates at the stamp, ego-motion undone.
+            owners: (N,) instance of each point.
+            column: (N,) column each point was measured in.
+            actors: What moves.
+        """
+        carried, seen = points.copy(), set(np.unique(owners).tolist())
+        frame_from_world = invert(self.world_from_frame)
+        for actor in actors:
+            if actor.id not in seen:
+                continue
+            own = np.flatnonzero(owners == actor.id)
+            columns, place = np.unique(column[own], return_inverse=True)
+            then = actor.trajectory.poses_at(np.append(self.times[columns], self.stamp))
+            motion = frame_from_world @ then[-1] @ invert(then[:-1]) @ self.world_from_frame
+            motion = motion[place]
+            carried[own] = (
+                np.einsum("nij,nj->ni", motion[:, :3, :3], points[own]) + motion[:, :3, 3]
+            )
+        return carried
