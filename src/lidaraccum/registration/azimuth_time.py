@@ -27,7 +27,11 @@ SURFACE_M = 0.15
 
 MAX_RANGE_M = 80.0
 LEAD = 1.2
-"""A seam must explain this many times as much as any other but its neighbours."""
+"""A seam must explain this many times as much as any other but those beside it."""
+
+ON_AXIS = 0.8
+"""Sweeps are cut at the encoder's zero, which is one of the sensor's axes more often than not: a
+seam there is taken when it explains this share of what one beside it does."""
 
 MAX_DISTANCE_M = 0.5
 MIN_SPREAD_M = 0.01
@@ -127,8 +131,11 @@ class AzimuthTime:
         heights = [self._height(sector) for sector in range(SECTORS)]
         gains = np.array([height.gain for height in heights])
         best = int(gains.argmax())
+        for beside in ((best - 1) % SECTORS, (best + 1) % SECTORS):
+            if beside % (SECTORS // 4) == 0 and gains[beside] > ON_AXIS * gains[best]:
+                best = beside
         apart = np.abs((np.arange(SECTORS) - best + SECTORS // 2) % SECTORS - SECTORS // 2)
-        is_alone = gains[apart > 1].max() * LEAD < gains[best]
+        is_alone = gains[apart > 2].max() * LEAD < gains[best]
         direction = 1 if heights[best].share > 0 else -1
         seam = Seam(2 * np.pi * best / SECTORS, direction)
         return (seam if is_alone else None), heights[best].turned(direction)

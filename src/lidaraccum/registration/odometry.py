@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import islice, pairwise
 
 import numpy as np
@@ -28,6 +29,10 @@ WINDOW = 5
 MAX_OPENING_PASSES = 3
 SETTLED_M, SETTLED_RAD = 0.02, 0.001
 """The first frames are solved again as long as the first motion changes by more."""
+
+LATE_CLOCK = (
+    "motion within the sweep is undone from here on, which may move the pose by a part of it"
+)
 
 Indexed = tuple[int, Frame]
 
@@ -87,6 +92,7 @@ class Odometry:
         self._recent: deque[tuple[Frame, Glimpse]] = deque(maxlen=WINDOW)
         self._last: tuple[int, rigid.Pose] | None = None
         self._stamp: float | None = None
+        self._clock_is_new = False
         self._tracker = Tracker(settings, self._pace, Compensated())
 
     def open(self, opening: list[Indexed]) -> list[RegisteredFrame]:
@@ -101,28 +107,41 @@ class Odometry:
         if len(passed) < 2:
             return passed
         clock = self._look_at_sweep() or first_clock
-        if clock == first_clock == Compensated() and self._is_steady(passed):
-            return passed
+        if clock == first_clock == Compensated():
+            return passed if self._is_steady(passed) else self._tried_again(opening, passed)
         for _ in range(MAX_OPENING_PASSES):
             twist = self._opening_twist(passed)
-            before, passed = passed, self._run(opening, clock, twist)
+            passed = self._run(opening, clock, twist)
             change = np.abs(self._opening_twist(passed) - twist)
             if change[3:].max() < SETTLED_M and change[:3].max() < SETTLED_RAD:
                 break
-        if clock == first_clock and _mean_overlap(passed) < _mean_overlap(before):
-            return self._run(opening, clock, None)
         return passed
+
+    def _tried_again(
+        self, opening: list[Indexed], unsteady: list[RegisteredFrame]
+    ) -> list[RegisteredFrame]:
+        """The first frames once more, from their usual motion; kept where more points fit."""
+        again = self._run(opening, Compensated(), self._opening_twist(unsteady))
+        if _mean_overlap(again) > _mean_overlap(unsteady):
+            return again
+        return self._run(opening, Compensated(), None)
 
     def follow(self, index: int, raw: Frame) -> RegisteredFrame:
         """Register the next frame and add it to the map."""
         if self._stamp is not None:
             self._pace.see(self._stamp, raw.stamp)
         registered = self._place(index, raw)
+        if self._clock_is_new:
+            quality = registered.quality
+            doubts = (*quality.doubts, LATE_CLOCK)
+            registered = replace(registered, quality=replace(quality, doubts=doubts))
+            self._clock_is_new = False
         if not self._detector.done and len(self._recent) == WINDOW:
             clock = self._look_at_sweep()
             self._recent.clear()
-            if clock is not None:
+            if clock is not None and clock != self._tracker.clock:
                 self._tracker.clock = clock
+                self._clock_is_new = True
         return registered
 
     def _run(
@@ -151,16 +170,20 @@ class Odometry:
             registered = self._tracker.follow(index, raw, usable, hints)
         self._last = index, registered.world_from_sensor
         self._stamp = raw.stamp
-        if not self._detector.done and self._tracker.twist is not None:
+        if not self._detector.done:
             points = raw.points[usable].astype(np.float64)
-            seen = Glimpse(points, registered.world_from_sensor, self._tracker.twist)
-            self._recent.append((raw, seen))
+            self._recent.append((raw, Glimpse(points, registered.world_from_sensor, np.zeros(6))))
         return registered
 
     def _look_at_sweep(self) -> SweepClock | None:
         if self._detector.done or len(self._recent) < 2:
             return None
-        frames, glimpses = zip(*self._recent, strict=True)
+        frames, seen = zip(*self._recent, strict=True)
+        twists = _steps_between(self._pace, [frame.stamp for frame in frames], seen)
+        before, after = np.vstack([twists[:1], twists]), np.vstack([twists, twists[-1:]])
+        glimpses = [
+            replace(one, twist=twist) for one, twist in zip(seen, (before + after) / 2, strict=True)
+        ]
         return self._detector.look(frames, glimpses, self._pace.interval_s)
 
     def _given_pose(self, index: int) -> rigid.Pose:
@@ -181,12 +204,18 @@ class Odometry:
         return bool((away < allowed).all())
 
     def _step_twists(self, passed: list[RegisteredFrame]) -> NDArray[np.float64]:
-        twists = []
-        for one, two in pairwise(passed):
-            steps = self._pace.steps(one.frame.stamp, two.frame.stamp, 1)
-            between = rigid.invert(one.world_from_sensor) @ two.world_from_sensor
-            twists.append(rigid.logarithm(between) / steps)
-        return np.stack(twists)
+        return _steps_between(self._pace, [one.frame.stamp for one in passed], passed)
+
+
+def _steps_between(
+    pace: Pace, stamps: Sequence[float], placed: Sequence[RegisteredFrame | Glimpse]
+) -> NDArray[np.float64]:
+    """Motion (T - 1, 6) over one frame interval from each of consecutive frames to the next."""
+    twists = []
+    for (earlier, one), (later, two) in pairwise(zip(stamps, placed, strict=True)):
+        between = rigid.invert(one.world_from_sensor) @ two.world_from_sensor
+        twists.append(rigid.logarithm(between) / pace.steps(earlier, later))
+    return np.stack(twists)
 
 
 def _mean_overlap(registered: list[RegisteredFrame]) -> float:
