@@ -95,6 +95,8 @@ class Site:
         far: float, *, along_street: bool = False,
     ) -> None:  # fmt: skip
         """So many things between two distances from the middle line."""
+        if count == 0:
+            return
         rng = self.rng
         places, heading = block.at(
             rng.uniform(0, block.length, count), rng.uniform(near, far, count)

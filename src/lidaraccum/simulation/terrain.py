@@ -19,55 +19,58 @@ MARGIN_M = 115.0
 
 @dataclass(frozen=True, eq=False)
 class Terrain:
-    """Heights on a grid of ``CELL_M``, linear on triangles between.
+    """Heights and distances on a grid of ``CELL_M``, linear on triangles between.
 
     Attributes:
         corner: (2,) x, y of the first grid point, metres.
-        heights: (X, Y) metres.
-        kerb: (X, Y) metres from the nearest kerb, negative on a carriageway.
-        walk: (X, Y) metres from the outer edge of the nearest pavement, negative inside.
+        fields: (X, Y, 3) metres: height; distance from the nearest kerb, negative on a carriageway;
+            distance from the outer edge of the nearest pavement, negative inside.
         kerb_m: How much higher pavements lie than the road.
     """
 
     corner: Array
-    heights: Array
-    kerb: Array
-    walk: Array
+    fields: Array
     kerb_m: float
+
+    @property
+    def heights(self) -> Array:
+        """(X, Y) metres."""
+        return self.fields[..., 0]
 
     def height(self, places: Array) -> Array:
         """Metres (N,) at places (N, 2), exactly on the ground's triangles."""
-        return self._between(self.heights, places)
+        return self._between(places)[:, 0]
 
     def kerb_distance(self, places: Array) -> Array:
         """Metres (N,) from the nearest kerb of places (N, 2); negative on a carriageway."""
-        return self._between(self.kerb, places)
+        return self._between(places)[:, 1]
 
     def walk_distance(self, places: Array) -> Array:
         """Metres (N,) from the outer edge of the nearest pavement; negative inside."""
-        return self._between(self.walk, places)
+        return self._between(places)[:, 2]
 
     def standing_height(self, places: Array) -> Array:
         """Metres (N,) on which one stands: the ground, or the pavement that lies on it."""
-        on_walk = (self.kerb_distance(places) >= 0) & (self.walk_distance(places) < 0)
-        return self.height(places) + np.where(on_walk, self.kerb_m, 0.0)
+        height, kerb, walk = self._between(places).T
+        return height + np.where((kerb >= 0) & (walk < 0), self.kerb_m, 0.0)
 
-    def _between(self, values: Array, places: Array) -> Array:
+    def _between(self, places: Array) -> Array:
+        """(N, 3) the fields at places (N, 2)."""
         scaled = (np.asarray(places) - self.corner) / CELL_M
-        scaled = np.clip(scaled, 0.0, np.array(values.shape) - 1.001)
-        cell = scaled.astype(np.int64)
-        u, v = (scaled - cell).T
-        i, j = cell.T
-        low, high = values[i, j], values[i + 1, j + 1]
-        steep = u > v
-        side = np.where(steep, values[i + 1, j], values[i, j + 1])
-        first, second = np.where(steep, u, v), np.where(steep, v, u)
-        return low + first * (side - low) + second * (high - side)
+        rows, columns = self.fields.shape[:2]
+        u = np.minimum(np.maximum(scaled[:, 0], 0.0), rows - 1.001)
+        v = np.minimum(np.maximum(scaled[:, 1], 0.0), columns - 1.001)
+        i, j = u.astype(np.int64), v.astype(np.int64)
+        u, v = (u - i)[:, None], (v - j)[:, None]
+        steep = (u > v)[:, 0]
+        low, high = self.fields[i, j], self.fields[i + 1, j + 1]
+        side = self.fields[i + steep, j + ~steep]
+        return low + np.maximum(u, v) * (side - low) + np.minimum(u, v) * (high - side)
 
     def covers(self, places: Array, margin: float = 1.0) -> NDArray[np.bool_]:
         """Whether places (N, 2) lie on the ground, ``margin`` metres from its edge."""
         low = self.corner + margin
-        high = self.corner + CELL_M * (np.array(self.heights.shape) - 1) - margin
+        high = self.corner + CELL_M * (np.array(self.fields.shape[:2]) - 1) - margin
         return np.all((places > low) & (places < high), axis=1)
 
 
@@ -85,8 +88,8 @@ def shape_terrain(network: Network, way: Array, rng: np.random.Generator) -> Ter
     for island in network.islands:
         gap = np.linalg.norm(places - island[:2], axis=1)
         heights += rng.uniform(0, 1.5) * np.clip(1 - gap / island[2], 0, 1)
-    kerb_m = float(rng.choice([0.05, 0.1, 0.13, 0.16]))
-    return Terrain(low, heights.reshape(shape), kerb.reshape(shape), walk.reshape(shape), kerb_m)
+    fields = np.stack([heights, kerb, walk], axis=1).reshape(*shape, 3)
+    return Terrain(low, fields, float(rng.choice([0.05, 0.1, 0.13, 0.16])))
 
 
 def _rolling(places: Array, rng: np.random.Generator) -> Array:
