@@ -36,6 +36,9 @@ MAX_ERROR = 0.1
 ORDERED_SHARE = 0.97
 """Share of a file's points that must follow each other around for its order to be the clock."""
 
+SAME_FIRING_RAD = 1e-3
+"""Beams of one firing may look this far back."""
+
 
 @dataclass(frozen=True)
 class Seam:
@@ -145,6 +148,6 @@ def seam_of_file_order(points: NDArray[np.floating]) -> Seam | None:
     step = np.mod(np.diff(firings) + np.pi, 2 * np.pi) - np.pi
     direction = 1 if step.sum() > 0 else -1
     turned = abs(float(step.sum())) / (2 * np.pi)
-    if np.mean(step * direction > 0) < ORDERED_SHARE or not 0.9 < turned < 1.1:
+    if np.mean(step * direction > -SAME_FIRING_RAD) < ORDERED_SHARE or not 0.9 < turned < 1.1:
         return None
     return Seam(float(azimuth[0]), direction)

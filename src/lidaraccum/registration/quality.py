@@ -44,9 +44,12 @@ class Judge:
             return False
         return alignment.score >= TRUSTED_SHARE * self._usual
 
-    def is_lost(self, located: Located) -> bool:
-        """Whether the best answer is none."""
-        return self._usual is not None and located.alignment.score < LOST_SHARE * self._usual
+    def is_lost(self, located: Located, *, is_smooth: bool) -> bool:
+        """Whether the best answer is none: it hardly fits, or fits badly and far from expected."""
+        if self._usual is None:
+            return False
+        needed = LOST_SHARE if is_smooth else DOUBTED_SHARE
+        return located.alignment.score < needed * self._usual
 
     def judge(self, located: Located, speed_mps: float) -> RegistrationQuality:
         """Put the answer's worth into words, and learn from it."""

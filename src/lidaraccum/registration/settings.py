@@ -36,7 +36,7 @@ class RegistrationSettings:
     lookahead: int = 5
     max_speed_mps: float = 40.0
     max_turn_dps: float = 50.0
-    min_overlap: float = 0.35
+    min_overlap: float = 0.25
     ambiguity: float = 0.02
 
     def __post_init__(self) -> None:

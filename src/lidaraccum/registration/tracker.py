@@ -169,12 +169,13 @@ class Tracker:
     def _conclude(self, scan: Scan, located: Located, expectation: Expectation) -> RegisteredFrame:
         """Believe the answer, or keep the expectation where nothing fits."""
         pose = located.alignment.world_from_sensor
-        lost = self._judge.is_lost(located)
+        first = expectation.starts[0]
+        is_smooth = not expectation.known or self._is_smooth(located, first, expectation.steps)
+        lost = self._judge.is_lost(located, is_smooth=is_smooth)
         quality = self._judge.judge(located, self._speed(pose, expectation.steps))
         self._lost = self._lost + 1 if lost else 0
         if lost:
-            kept = expectation.starts[0]
-            pose, quality = kept.world_from_sensor, replace(quality, hypothesis=kept.name)
+            pose, quality = first.world_from_sensor, replace(quality, hypothesis=first.name)
         twist = self._twist_to(pose, expectation.steps)
         if not lost:
             self.twist = twist
