@@ -18,8 +18,8 @@ DOUBTED_SHARE = 0.7
 LOST_SHARE = 0.5
 """Below this the frame does not lie on the map at all."""
 
-MEMORY = 0.9
-"""How slowly the usual score follows."""
+MEMORY_OF_WORSE, MEMORY_OF_BETTER = 0.9, 0.5
+"""How slowly the usual score follows; quickly upwards, as the map fills."""
 
 MIN_HOLD = 0.003
 """Information per point that a direction needs to be fixed: what three planes in a thousand that
@@ -57,7 +57,8 @@ class Judge:
         doubts = self._doubts(located, speed_mps)
         if not doubts or self._usual is None:
             usual = alignment.score if self._usual is None else self._usual
-            self._usual = MEMORY * usual + (1 - MEMORY) * alignment.score
+            memory = MEMORY_OF_BETTER if alignment.score > usual else MEMORY_OF_WORSE
+            self._usual = memory * usual + (1 - memory) * alignment.score
         return RegistrationQuality(
             located.hypothesis, alignment.overlap, alignment.residual_m, tuple(doubts)
         )
