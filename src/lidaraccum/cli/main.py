@@ -7,6 +7,7 @@ import click
 import lidaraccum
 from lidaraccum.cli.accumulate import accumulate
 from lidaraccum.cli.config import config
+from lidaraccum.cli.evaluate import evaluate
 from lidaraccum.cli.info import info
 from lidaraccum.cli.mesh import mesh
 from lidaraccum.cli.simulate import simulate
@@ -22,5 +23,5 @@ def cli() -> None:
     """
 
 
-for command in (accumulate, mesh, info, simulate, config):
+for command in (accumulate, mesh, info, simulate, evaluate, config):
     cli.add_command(command)

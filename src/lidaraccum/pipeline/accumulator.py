@@ -75,13 +75,30 @@ def accumulate(sequence: Sequence, settings: AccumulateSettings | None = None) -
 class Accumulator:
     """One run over one sequence, frame by frame in bounded memory."""
 
-    def __init__(self, sequence: Sequence, settings: AccumulateSettings) -> None:
+    def __init__(
+        self,
+        sequence: Sequence,
+        settings: AccumulateSettings,
+        *,
+        perceiver: Perceiver | None = None,
+        registered: Iterable[RegisteredFrame] | None = None,
+    ) -> None:
+        """Prepare a run.
+
+        Args:
+            sequence: What to accumulate.
+            settings: How.
+            perceiver: What finds the movers, where it is not the one that the settings name.
+            registered: The sequence's frames, registered before; otherwise they are read and
+                registered here.
+        """
         if len(sequence) < 2:
             raise InputError(f"{sequence.name} has {len(sequence)} frame; it takes at least 2")
         self._sequence = sequence
         self._settings = settings
         self._reference_index = reference_index(settings.reference, sequence)
-        self._perceiver = choose_perceiver(settings.method, sequence)
+        self._perceiver = perceiver or choose_perceiver(settings.method, sequence)
+        self._registered = registered
         self._selection = Selection(settings.selection)
         self._book = TrackBook()
         self._reference: Reference | None = None
@@ -92,7 +109,9 @@ class Accumulator:
     def frames(self) -> Iterator[AccumulatedFrame]:
         """Each frame in the reference frame, in order, all its points; `select` thins them."""
         frames = self.clock.timed("read", self._read())
-        registered = self.clock.timed("register", self._register(frames))
+        registered = self._registered
+        if registered is None:
+            registered = self.clock.timed("register", self._register(frames))
         perceived = self.clock.timed("perceive", self._perceiver.perceive(registered))
         noted = self._note(perceived)
         if self._reference_index > 0:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import Protocol
 
 import numpy as np
@@ -37,10 +37,17 @@ class AllStatic:
 
 
 class GivenLabels:
-    """Believes the labels and boxes that came with the sequence; poses stay the pipeline's own."""
+    """Believes the labels and boxes that came with the sequence; poses stay the pipeline's own.
 
-    def __init__(self, sequence: LabelledSequence) -> None:
+    Args:
+        sequence: Whose labels.
+        movers: Instances that follow their boxes in every frame; any other follows its box in the
+            frames whose labels call it dynamic.
+    """
+
+    def __init__(self, sequence: LabelledSequence, movers: Collection[int] = ()) -> None:
         self._sequence = sequence
+        self._movers = frozenset(movers)
 
     def perceive(self, frames: Iterable[RegisteredFrame]) -> Iterator[PerceivedFrame]:
         """Each frame with its given labels, confidence 1 where it is annotated.
@@ -61,7 +68,7 @@ class GivenLabels:
             )
         boxed = {box.id for box in labels.boxes}
         # A mover without a box has no motion to undo: it stays where the sensor saw it.
-        moving = set(np.unique(labels.instance[labels.dynamic]).tolist()) & boxed
+        moving = (set(np.unique(labels.instance[labels.dynamic]).tolist()) | self._movers) & boxed
         annotated = np.ones(count, bool) if labels.annotated is None else labels.annotated
         return PerceivedFrame(
             registered=registered,

@@ -1,0 +1,1 @@
+"""How good the pipeline is, beside what one would use instead."""

@@ -1,0 +1,68 @@
+"""Objects from points that are known to be movable: density clustering of a window or a frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from lidaraccum.geometry.voxel import voxel_keys
+
+VOXEL_M = 0.15
+"""The paper, section 3.3: points are thinned before they are clustered."""
+RADIUS_M = 0.4
+NEIGHBOURS = 5
+"""Radius and least number of neighbours of DBSCAN, seen from above; METHOD.md section 4."""
+MIN_VOXELS = 15
+"""Clusters of fewer voxels are dropped; same source."""
+
+Points = NDArray[np.float64]
+Ids = NDArray[np.int32]
+
+
+def dbscan(positions: Points, radius_m: float, neighbours: int) -> NDArray[np.int64]:
+    """Cluster (N,), -1 for noise, of positions (N, D).
+
+    Ester et al., "A density-based algorithm" (KDD 1996); a point counts among its neighbours.
+    """
+    cluster = np.full(len(positions), -1, dtype=np.int64)
+    if len(positions) == 0:
+        return cluster
+    pairs = cKDTree(positions).query_pairs(radius_m, output_type="ndarray")
+    counts = 1 + np.bincount(pairs.ravel(), minlength=len(positions))
+    core = counts >= neighbours
+    one, two = pairs.T
+    both = core[one] & core[two]
+    links = coo_matrix(
+        (np.ones(int(both.sum())), (one[both], two[both])), shape=(len(positions),) * 2
+    )
+    _, named = connected_components(links, directed=False)
+    _, cluster[core] = np.unique(named[core], return_inverse=True)
+    for inner, border in ((one, two), (two, one)):
+        joins = core[inner] & ~core[border]
+        cluster[border[joins]] = cluster[inner[joins]]
+    return cluster
+
+
+def cluster_points(points: Points, min_voxels: int = MIN_VOXELS) -> Ids:
+    """Object (N,), 0 for none, counted from 1, of points (N, 3), metres."""
+    if len(points) == 0:
+        return np.zeros(0, dtype=np.int32)
+    _, first, voxel = np.unique(voxel_keys(points, VOXEL_M), return_index=True, return_inverse=True)
+    cluster = dbscan(points[first, :2], RADIUS_M, NEIGHBOURS)
+    sizes = np.bincount(cluster[cluster >= 0], minlength=1)
+    kept = np.flatnonzero(sizes >= min_voxels)
+    number = np.zeros(len(sizes) + 1, dtype=np.int32)
+    number[kept] = np.arange(1, len(kept) + 1)
+    return number[cluster][voxel]
+
+
+def cluster_window(frames: Sequence[Points]) -> list[Ids]:
+    """Objects of all frames' points (N_t, 3), world, clustered together: one id an object."""
+    ids = cluster_points(np.concatenate(list(frames)))
+    ends = np.cumsum([len(points) for points in frames])[:-1]
+    return list(np.split(ids, ends))

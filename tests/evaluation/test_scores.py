@@ -1,0 +1,78 @@
+"""Scores of one window, and of several together."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lidaraccum.data.accumulation import MOVING, AccumulatedFrame
+from lidaraccum.data.window import Window
+from lidaraccum.evaluation.scores import Scores, score_window
+from lidaraccum.evaluation.truth import WindowTruth, window_truth
+
+
+def placed(truth: WindowTruth, shift: float = 0.0) -> list[AccumulatedFrame]:
+    """The true answer, all but the target's points off by a shift along z."""
+    frames = []
+    for index, frame in enumerate(truth.frames):
+        count = len(frame.known)
+        points = frame.in_target + np.array([0.0, 0.0, shift if index else 0.0])
+        frames.append(
+            AccumulatedFrame(
+                index=index,
+                points=points,
+                rows=np.arange(count),
+                row_count=count,
+                label=np.where(frame.dynamic, MOVING, 0).astype(np.uint8),
+                instance=frame.instance,
+                confidence=np.ones(count, dtype=np.float32),
+                time=np.zeros(count),
+                range_m=np.ones(count, dtype=np.float32),
+                stamp=0.1 * index,
+                reference_from_sensor=truth.poses[index],
+                attributes={},
+            )
+        )
+    return frames
+
+
+def test_the_truth_itself_scores_perfectly(hand_made: Any) -> None:
+    truth = window_truth(Window(hand_made, 0, 3), 0)
+    scores = score_window(placed(truth), truth, 0, 1.5)
+    assert scores.flow.everything.epe_mean == 0.0
+    assert (scores.flow.static.points, scores.flow.dynamic.points) == (6, 4)
+    assert scores.unknown_points == 2
+    assert scores.motion.iou == scores.foreground.iou == 1.0
+    assert scores.association.weighted_coverage == 1.0
+    assert scores.moving_association.weighted_coverage == 1.0
+    assert scores.absolute.translation.largest == scores.relative.translation.largest == 0.0
+    assert scores.seconds_per_window == 1.5
+
+
+def test_a_shift_is_the_epe_of_every_source_frame_and_of_none_but_those(hand_made: Any) -> None:
+    truth = window_truth(Window(hand_made, 0, 3), 0)
+    scores = score_window(placed(truth, 0.2), truth, 0, 0.0)
+    assert scores.flow.everything.epe_mean == pytest.approx(0.2)
+    assert sorted(scores.by_gap) == [1, 2]
+    assert sum(flow.everything.points for flow in scores.by_gap.values()) == 10
+
+
+def test_gaps_count_both_ways_from_a_target_in_the_middle(hand_made: Any) -> None:
+    window = Window(hand_made, 0, 3, "middle")
+    truth = window_truth(window, 0)
+    scores = score_window(placed(truth), truth, window.target, 0.0)
+    assert list(scores.by_gap) == [1]
+
+
+def test_two_added_are_both(hand_made: Any) -> None:
+    truth = window_truth(Window(hand_made, 0, 3), 0)
+    one = score_window(placed(truth, 0.1), truth, 0, 1.0)
+    other = score_window(placed(truth, 0.3), truth, 0, 3.0)
+    both = one + other
+    assert both.flow.everything.epe_mean == pytest.approx(0.2)
+    assert both.by_gap[2].everything.points == 2 * one.by_gap[2].everything.points
+    assert both.seconds_per_window == 2.0
+    assert Scores.pool([]).windows == 0
+    assert Scores.pool([one, other]).flow.static.points == both.flow.static.points
