@@ -170,11 +170,11 @@ class SimulatedSequence:
         sweep = self._sweep(index, rays)
         local = rays.local * np.where(back, distance, 0).reshape(echoes.distance.shape)[..., None]
         local[..., 2] += self.drawn.sensor.height.astype(np.float32)
-        level = sweep.at_stamp(local).reshape(-1, 3)[kept]
+        level = sweep.at_stamp(local).reshape(-1, 3).take(kept, axis=0)
         level[~came] = 0.0
         points = level
         if self.drawn.rolling_shutter and not self.drawn.compensated:
-            points = self._mounted(local).reshape(-1, 3)[kept]
+            points = self._mounted(local).reshape(-1, 3).take(kept, axis=0)
             points[~came] = 0.0
         frame = Frame(
             points=points,

@@ -8,7 +8,7 @@ from lidaraccum.simulation.mesh import Finish, Mesh, blob, box, disc_wheel, lath
 from lidaraccum.simulation.models import Model, model, of_parts
 from lidaraccum.simulation.surfaces import Surface
 
-GAIT_PHASES = 8
+GAIT_PHASES = 6
 SKIN = Finish(Surface.SKIN, 0.45)
 
 

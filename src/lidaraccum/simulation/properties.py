@@ -23,7 +23,7 @@ def _terrace(site: Site, block: Block) -> None:
         site.barrier(
             block, block.frontage + 0.3, {"wall": 3, "railing": 2, "hedge": 2, "pickets": 1}
         )
-    site.car_sized(block, rng.poisson(block.length / 40), block.frontage - 1.2, block.frontage + 1)
+    site.car_sized(block, rng.poisson(block.length / 22), block.frontage - 1.2, block.frontage + 1)
 
 
 def _houses(site: Site, block: Block) -> None:
@@ -59,7 +59,7 @@ def _garden(site: Site, block: Block, setback: float) -> None:
     site.scatter(
         draw_tree, block, rng.poisson(block.length / 16), front + 1.5, front + setback + 14
     )
-    site.car_sized(block, rng.poisson(block.length / 25), front + 1, front + setback + 3)
+    site.car_sized(block, rng.poisson(block.length / 15), front + 1, front + setback + 3)
     back = front + setback + rng.uniform(14, 20)
     site.barrier(block, back, {"hedge": 3, "boards": 1, "wire_mesh": 1, "wall": 1})
 
@@ -81,6 +81,7 @@ def _wood(site: Site, block: Block) -> None:
     site.scatter(draw_tree, block, rng.poisson(block.length / 3.5), front + 1.5, front + 25)
     site.scatter(bush, block, rng.poisson(block.length / 4), front + 1.2, front + 14)
     site.scatter(tufts, block, rng.poisson(block.length / 2.5), front + 0.6, front + 10)
+    site.car_sized(block, rng.poisson(block.length / 30), front + 1, front + 12)
 
 
 def _field(site: Site, block: Block) -> None:
@@ -98,7 +99,7 @@ def _field(site: Site, block: Block) -> None:
     site.scatter(draw_tree, block, rng.poisson(block.length / 25), front + 2, front + 40)
     site.scatter(bush, block, rng.poisson(block.length / 14), front + 1.5, front + 25)
     site.scatter(tufts, block, rng.poisson(block.length / 3), front + 0.6, front + 12)
-    site.car_sized(block, rng.poisson(block.length / 45), front + 2, front + 25)
+    site.car_sized(block, rng.poisson(block.length / 28), front + 1.5, front + 20)
 
 
 def _yard(site: Site, block: Block) -> None:
@@ -157,6 +158,7 @@ def _screen(site: Site, block: Block) -> None:
     site.scatter(draw_tree, block, rng.poisson(block.length / 6), front + 6, front + 30)
     site.scatter(bush, block, rng.poisson(block.length / 6), front + 2, front + 12)
     site.scatter(tufts, block, rng.poisson(block.length / 4), front + 1.2, front + 8)
+    site.car_sized(block, rng.poisson(block.length / 35), front + 1.5, front + 10)
 
 
 PROPERTIES: dict[str, Callable[[Site, Block], None]] = {

@@ -107,14 +107,14 @@ def measure(
     lost = ~hit | (distance > sensor.max_range_m) | (distance < sensor.min_range_m)
     if realism.faint:
         lost |= rng.random(distance.shape, dtype=np.float32) * (signal**2 + 0.06) > signal**2 * 1.1
-        glare = LOSS_SHARE[surface] * np.float32(1.0)
+        glare = LOSS_SHARE.take(surface)
         shiny = glare > 0
         lost[shiny] |= rng.random(int(shiny.sum()), dtype=np.float32) < glare[shiny]
     if realism.drop > 0:
         lost |= rng.random(distance.shape, dtype=np.float32) < realism.drop
     measured = safe
     if realism.noise > 0:
-        rough = ROUGHNESS_M[surface] / np.maximum(slant, np.float32(0.3))
+        rough = ROUGHNESS_M.take(surface) / np.maximum(slant, np.float32(0.3))
         sigma = np.sqrt(np.float32(sensor.range_noise_m) ** 2 + rough**2) * np.float32(
             realism.noise
         )

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
+FAR_M = 50.0
+"""Beyond this it does not matter how far a road is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,20 +201,20 @@ class Network:
     islands: Array
     ego_speed_limit: float = 40.0
 
-    def kerb_distance(self, places: Array) -> Array:
-        """Metres (N,) from the nearest kerb of places (N, 2); negative on a carriageway."""
-        nearest = np.full(len(places), np.inf)
-        for road in self.roads:
-            nearest = np.minimum(nearest, road.tree.query(places)[0] - road.half_m)
-        return nearest
+    def edge_distances(self, places: Array) -> tuple[Array, Array]:
+        """How far places (N, 2) lie from the road, metres, at most about ``FAR_M``.
 
-    def walk_distance(self, places: Array) -> Array:
-        """Metres (N,) from the outer edge of the nearest pavement; negative inside."""
-        nearest = np.full(len(places), np.inf)
+        Returns:
+            (N,) from the nearest kerb, negative on a carriageway; and (N,) from the outer edge of
+            the nearest pavement, negative inside.
+        """
+        kerb = np.full(len(places), FAR_M)
+        walk = kerb.copy()
         for road in self.roads:
-            distance = road.tree.query(places)[0]
-            nearest = np.minimum(nearest, distance - road.half_m - road.walk_m)
-        return nearest
+            gap = road.tree.query(places, distance_upper_bound=FAR_M)[0] - road.half_m
+            np.minimum(kerb, gap, out=kerb)
+            np.minimum(walk, gap - road.walk_m, out=walk)
+        return kerb, walk
 
     def in_square(self, places: Array) -> NDArray[np.bool_]:
         """Whether places (N, 2) lie in an open square."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,8 @@ Float = NDArray[np.float32]
 PASSES = 3
 """A ray goes through so many see-through surfaces at most, less one."""
 STEP_PAST_M = 0.01
-KNOTS = 65
-"""Columns at which an actor's bearing is worked out exactly before it is culled."""
+STRIDE = 24
+"""An actor's bearing is worked out at so many columns' distance before it is culled."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +161,7 @@ class Stage:
         found = self._nearest(bundle, np.arange(len(bundle)), visits)
         gone = np.zeros(len(bundle), dtype=np.float32)
         for _ in range(PASSES - 1):
-            share = PASS_SHARE[found.surface]
+            share = PASS_SHARE.take(found.surface)
             open_to = np.flatnonzero((share > 0) & np.isfinite(found.distance))
             through = open_to[rng.random(len(open_to)) < share[open_to]]
             if not len(through):
@@ -183,11 +184,13 @@ class Stage:
         hits = self._ground.scene.cast(bundle)
         mesh, triangle = self.world.mesh, np.maximum(hits.triangle, 0)
         missed = hits.triangle < 0
-        slant = np.abs(np.einsum("ni,ni->n", self._ground.normals[triangle], bundle[:, 3:]))
+        slant = np.abs(
+            np.einsum("ni,ni->n", self._ground.normals.take(triangle, axis=0), bundle[:, 3:])
+        )
         found = Encounter(
-            hits.distance, np.where(missed, np.uint8(0), mesh.surface[triangle]),
+            hits.distance, np.where(missed, np.uint8(0), mesh.surface.take(triangle)),
             mesh.reflectivity[triangle], slant,
-            np.where(missed, np.int32(0), self.world.instance[triangle]),
+            np.where(missed, np.int32(0), self.world.instance.take(triangle)),
         )  # fmt: skip
         for visit in visits:
             rows, own = _rows_of(visit.numbers, numbers, gone is None)
@@ -212,32 +215,50 @@ class Stage:
         """The rays that may meet an actor, in the actor's own coordinates at each ray's time."""
         height = actor.model.size_lwh[2]
         radius = 0.5 * float(np.linalg.norm(actor.model.size_lwh)) + 0.05 + 0.1 * height
-        some = np.unique(np.linspace(0, len(rays.times) - 1, KNOTS).astype(int))
-        offset = actor.trajectory.place_at(rays.times[some]) - rays.world_from_sensor[some, :3, 3]
-        offset[:, 2] += 0.5 * height
-        if np.linalg.norm(offset, axis=1).min() > reach_m + radius:
+        columns = self._facing(actor, rays, sensor, radius, reach_m)
+        if not len(columns):
             return []
-        coarse = np.einsum("cij,ci->cj", rays.world_from_sensor[some, :3, :3], offset)
-        every = np.arange(len(rays.times))
-        local = np.stack([np.interp(every, some, axis) for axis in coarse.T], axis=1)
+        place = actor.trajectory.place_at(rays.times[columns])
+        offset = place - rays.world_from_sensor[columns, :3, 3]
+        offset[:, 2] += 0.5 * height
+        local = np.einsum("cij,ci->cj", rays.world_from_sensor[columns, :3, :3], offset)
         flat = np.maximum(np.hypot(local[:, 0], local[:, 1]), 1e-3)
-        distance = np.hypot(flat, local[:, 2])
-        wide = np.where(flat > radius, np.arcsin(np.minimum(radius / flat, 1.0)), np.pi)
-        bearing = np.arctan2(local[:, 1], local[:, 0]) - rays.azimuth
+        wide = _half_angle(radius, flat)
+        bearing = np.arctan2(local[:, 1], local[:, 0]) - rays.azimuth[columns]
         up = np.arctan2(local[:, 2], flat)
-        tall = np.where(distance > radius, np.arcsin(np.minimum(radius / distance, 1.0)), np.pi)
+        tall = _half_angle(radius, np.hypot(flat, local[:, 2]))
         found = []
         for turn, spread, members in _beam_groups(sensor):
             gap = np.abs(np.mod(bearing - turn + np.pi, 2 * np.pi) - np.pi)
-            columns = np.flatnonzero(gap < wide + spread + 0.005)
-            if not len(columns):
+            near = np.flatnonzero(gap < wide + spread + 0.005)
+            if not len(near):
                 continue
-            low, high = (up - tall)[columns].min() - 0.03, (up + tall)[columns].max() + 0.03
+            low, high = (up - tall)[near].min() - 0.03, (up + tall)[near].max() + 0.03
             level = sensor.elevation[members]
             beams = members[(level > low) & (level < high)]
             if len(beams):
-                found.append(self._visit(actor, rays, columns, beams))
+                found.append(self._visit(actor, rays, columns[near], beams))
         return found
+
+    def _facing(
+        self, actor: Actor, rays: Rays, sensor: Sensor, radius: float, reach_m: float
+    ) -> NDArray[np.int64]:
+        """Columns that may meet an actor, from its bearing at every ``STRIDE`` columns."""
+        some = np.arange(0, len(rays.times) + STRIDE, STRIDE).clip(max=len(rays.times) - 1)
+        offset = actor.trajectory.place_at(rays.times[some]) - rays.world_from_sensor[some, :3, 3]
+        distance = np.linalg.norm(offset, axis=1)
+        if distance.min() > reach_m + radius:
+            return np.zeros(0, dtype=np.int64)
+        local = np.einsum("cij,ci->cj", rays.world_from_sensor[some, :3, :3], offset)
+        wide = _half_angle(radius, np.maximum(np.hypot(local[:, 0], local[:, 1]), 1e-3))
+        bearing = np.arctan2(local[:, 1], local[:, 0]) - rays.azimuth[some]
+        step = 2 * np.pi * STRIDE / len(rays.times)
+        facing = np.zeros(len(some), dtype=np.bool_)
+        for turn, spread, _ in _beam_groups(sensor):
+            gap = np.abs(np.mod(bearing - turn + np.pi, 2 * np.pi) - np.pi)
+            facing |= gap < wide + spread + 1.5 * step
+        spread_out = some[facing][:, None] + np.arange(-STRIDE, STRIDE + 1)
+        return np.unique(spread_out.clip(0, len(rays.times) - 1))
 
     def _visit(
         self, actor: Actor, rays: Rays, columns: NDArray[np.int64], beams: NDArray[np.int64]
@@ -288,6 +309,13 @@ def _rows_of(
     return rows[own], own
 
 
+def _half_angle(radius: float, distance: Array) -> Array:
+    """Radians (C,) under which half of a ball is seen; all round from within."""
+    angle = np.arcsin(np.minimum(radius / np.maximum(distance, 1e-3), 1.0))
+    return np.where(distance > radius, angle, np.pi)
+
+
+@lru_cache(maxsize=16)
 def _beam_groups(sensor: Sensor) -> list[tuple[float, float, NDArray[np.int64]]]:
     """Beams of about the same azimuth: their middle, half their spread, their rows."""
     key = np.round(sensor.azimuth / np.deg2rad(3.0)).astype(int)

@@ -119,7 +119,7 @@ class Site:
         rng, along = self.rng, self.rng.uniform(0, 3)
         names, weights = list(chances), np.array(list(chances.values()))
         while along < block.length - 4:
-            stretch = min(rng.uniform(6, 22), block.length - along)
+            stretch = min(rng.uniform(3.5, 20), block.length - along)
             name = str(rng.choice(names, p=weights / weights.sum()))
             line = block.line(along, along + stretch, lateral + rng.normal(0, 0.15))
             self.plot.run_barrier(BARRIERS[name], line, 0.35)

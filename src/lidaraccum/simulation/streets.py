@@ -10,6 +10,9 @@ from lidaraccum.simulation.roads import Road
 from lidaraccum.simulation.site import Block, Site
 from lidaraccum.simulation.vegetation import draw_tree
 
+EDGE_M = 28.0
+"""Blocks nearer to the edge of the ground than this stay empty."""
+
 STYLES: dict[str, dict[str, float]] = {
     "straight": {"terrace": 7, "houses": 2, "park": 1, "yard": 1, "carpark": 1},
     "curved": {"terrace": 3, "houses": 3, "park": 1, "wood": 1, "carpark": 1},
@@ -47,7 +50,7 @@ def line_road(site: Site, road: Road, kind: str) -> None:
 
 def _is_near(site: Site, block: Block) -> bool:
     middle, _ = block.at(0.5 * block.length, block.frontage)
-    return bool(site.plot.terrain.covers(middle[None], 12.0)[0])
+    return bool(site.plot.terrain.covers(middle[None], EDGE_M)[0])
 
 
 def _park_row(site: Site, block: Block) -> None:

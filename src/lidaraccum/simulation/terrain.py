@@ -13,7 +13,7 @@ from lidaraccum.simulation.surfaces import Surface
 
 Array = NDArray[np.float64]
 CELL_M = 2.0
-MARGIN_M = 115.0
+MARGIN_M = 110.0
 """Ground laid about the ego's way."""
 
 
@@ -81,7 +81,7 @@ def shape_terrain(network: Network, way: Array, rng: np.random.Generator) -> Ter
     x = low[0] + CELL_M * np.arange(shape[0])
     y = low[1] + CELL_M * np.arange(shape[1])
     places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=2).reshape(-1, 2)
-    kerb, walk = network.kerb_distance(places), network.walk_distance(places)
+    kerb, walk = network.edge_distances(places)
     heights = (
         _rolling(places, rng) + _crown(network, kerb, rng) + _banks(network, places, walk, rng)
     )
@@ -229,7 +229,7 @@ def _kerb(
     raised = heights + np.array([-0.05, height, height, -0.05])
     strip = grid(np.concatenate([places, raised[..., None]], axis=2), finish)
     middle = places[:, 1:3].mean(axis=1)
-    keep = terrain.covers(middle) & (network.kerb_distance(middle) > -0.1)
+    keep = terrain.covers(middle) & (terrain.kerb_distance(middle) > -0.1)
     keep = np.repeat(keep[:-1] & keep[1:], 3)
     keep = np.concatenate([keep, keep])
     return Mesh(
