@@ -21,7 +21,7 @@ from lidaraccum.registration.pace import Pace
 from lidaraccum.registration.scan import StaticMask, usable_points
 from lidaraccum.registration.settings import RegistrationSettings
 from lidaraccum.registration.sweep import SweepDetector
-from lidaraccum.registration.tracker import Tracker
+from lidaraccum.registration.tracker import MAX_ACCELERATION, SMOOTH_M, Tracker
 
 WINDOW = 5
 """Frames looked at together for the motion within a sweep."""
@@ -33,6 +33,9 @@ SETTLED_M, SETTLED_RAD = 0.02, 0.001
 LATE_CLOCK = (
     "motion within the sweep is undone from here on, which may move the pose by a part of it"
 )
+
+LATE_MOTION_M = 0.4
+"""Motion per frame from which on a clock that is found late is worth a doubt."""
 
 Indexed = tuple[int, Frame]
 
@@ -141,8 +144,12 @@ class Odometry:
             self._recent.clear()
             if clock is not None and clock != self._tracker.clock:
                 self._tracker.clock = clock
-                self._clock_is_new = True
+                self._clock_is_new = self._is_fast()
         return registered
+
+    def _is_fast(self) -> bool:
+        twist = self._tracker.twist
+        return twist is not None and bool(np.linalg.norm(twist[3:]) > LATE_MOTION_M)
 
     def _run(
         self, opening: list[Indexed], clock: SweepClock, twist: NDArray[np.float64] | None
@@ -199,7 +206,8 @@ class Odometry:
 
     def _is_steady(self, passed: list[RegisteredFrame]) -> bool:
         steps = self._step_twists(passed)
-        allowed = 0.2 + 8.0 * self._pace.interval_s**2 * np.arange(1, len(steps) + 1)
+        frames = np.arange(1, len(steps) + 1)
+        allowed = SMOOTH_M + MAX_ACCELERATION * self._pace.interval_s**2 * frames
         away = np.linalg.norm(steps[:, 3:] - np.median(steps, axis=0)[3:], axis=1)
         return bool((away < allowed).all())
 
