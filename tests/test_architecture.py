@@ -29,7 +29,14 @@ FLOOR_OF = {
 
 HOMES_OF = {
     "click": {"cli"},
-    "open3d": {"simulation/sensor", "simulation/raycast", "registration", "pipeline/meshing"},
+    "open3d": {
+        "simulation/sensor",
+        "simulation/raycast",
+        "registration",
+        "pipeline/meshing",
+        "evaluation/rivals",
+    },
+    "kiss_icp": {"evaluation/rivals"},
     "small_gicp": {"registration"},
     "laspy": {"io"},
     "plyfile": {"io"},

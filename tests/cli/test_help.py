@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-COMMANDS = ("accumulate", "mesh", "info", "simulate", "evaluate", "config")
+COMMANDS = ("accumulate", "mesh", "info", "simulate", "evaluate", "benchmark", "config")
 
 
 def test_help_names_every_command(run: Any) -> None:

@@ -6,6 +6,7 @@ import click
 
 import lidaraccum
 from lidaraccum.cli.accumulate import accumulate
+from lidaraccum.cli.benchmark import benchmark
 from lidaraccum.cli.config import config
 from lidaraccum.cli.evaluate import evaluate
 from lidaraccum.cli.info import info
@@ -23,5 +24,5 @@ def cli() -> None:
     """
 
 
-for command in (accumulate, mesh, info, simulate, evaluate, config):
+for command in (accumulate, mesh, info, simulate, evaluate, benchmark, config):
     cli.add_command(command)
