@@ -55,10 +55,8 @@ def _houses(site: Site, block: Block) -> None:
 
 def _garden(site: Site, block: Block, setback: float) -> None:
     rng, front = site.rng, block.frontage
-    site.scatter(bush, block, rng.poisson(block.length / 9), front + 0.8, front + setback)
-    site.scatter(
-        draw_tree, block, rng.poisson(block.length / 16), front + 1.5, front + setback + 14
-    )
+    site.scatter(bush, block, rng.poisson(block.length / 4.5), front + 0.8, front + setback)
+    site.scatter(draw_tree, block, rng.poisson(block.length / 6), front + 1.5, front + setback + 14)
     site.car_sized(block, rng.poisson(block.length / 15), front + 1, front + setback + 3)
     back = front + setback + rng.uniform(14, 20)
     site.barrier(block, back, {"hedge": 3, "boards": 1, "wire_mesh": 1, "wall": 1})
@@ -70,8 +68,8 @@ def _park(site: Site, block: Block) -> None:
         site.barrier(
             block, front + 0.4, {"hedge": 3, "wall": 2, "railing": 2, "wire_mesh": 1, "bank": 1}
         )
-    site.scatter(draw_tree, block, rng.poisson(block.length / 7), front + 1, front + 30)
-    site.scatter(bush, block, rng.poisson(block.length / 5), front + 0.8, front + 20)
+    site.scatter(draw_tree, block, rng.poisson(block.length / 4), front + 1, front + 30)
+    site.scatter(bush, block, rng.poisson(block.length / 2.5), front + 0.8, front + 20)
     site.scatter(tufts, block, rng.poisson(block.length / 6), front + 0.5, front + 15)
     site.car_sized(block, rng.poisson(block.length / 9), front + 0.8, front + 18)
 
@@ -79,7 +77,7 @@ def _park(site: Site, block: Block) -> None:
 def _wood(site: Site, block: Block) -> None:
     rng, front = site.rng, block.frontage
     site.scatter(draw_tree, block, rng.poisson(block.length / 3.5), front + 1.5, front + 25)
-    site.scatter(bush, block, rng.poisson(block.length / 4), front + 1.2, front + 14)
+    site.scatter(bush, block, rng.poisson(block.length / 2.2), front + 1.2, front + 14)
     site.scatter(tufts, block, rng.poisson(block.length / 2.5), front + 0.6, front + 10)
     site.car_sized(block, rng.poisson(block.length / 30), front + 1, front + 12)
 
@@ -96,8 +94,8 @@ def _field(site: Site, block: Block) -> None:
             "bank": 1,
         }
         site.barrier(block, front + rng.uniform(0.8, 3), kinds)
-    site.scatter(draw_tree, block, rng.poisson(block.length / 25), front + 2, front + 40)
-    site.scatter(bush, block, rng.poisson(block.length / 14), front + 1.5, front + 25)
+    site.scatter(draw_tree, block, rng.poisson(block.length / 12), front + 2, front + 40)
+    site.scatter(bush, block, rng.poisson(block.length / 8), front + 1.5, front + 25)
     site.scatter(tufts, block, rng.poisson(block.length / 3), front + 0.6, front + 12)
     site.car_sized(block, rng.poisson(block.length / 28), front + 1.5, front + 20)
 

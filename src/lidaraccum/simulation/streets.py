@@ -58,7 +58,7 @@ def _park_row(site: Site, block: Block) -> None:
     strip = block.road.parking_m
     if strip <= 0:
         return
-    rng, share = site.rng, site.rng.beta(1.2, 1.6) * (0.35 + 0.65 * site.crowd)
+    rng, share = site.rng, site.rng.beta(1.5, 1.4) * (0.45 + 0.55 * site.crowd)
     angled = strip > 4
     tilt = rng.uniform(0.9, 1.57) if angled else 0.0
     step, along = (2.7 / max(np.sin(tilt), 0.5) if angled else 5.9), 2.0
@@ -84,11 +84,13 @@ def _pavement(site: Site, block: Block, style: str) -> None:
     makers = [KERB_SIDE[int(k)] for k in rng.integers(len(KERB_SIDE), size=count)]
     for maker in makers:
         site.scatter(maker, block, 1, at_kerb, at_kerb, along_street=True)
-    if walk >= 2.0 and rng.random() < 0.35:
-        gap = rng.uniform(7, 16)
+    if walk >= 1.5 and rng.random() < 0.5:
+        gap = rng.uniform(5, 14)
         along = np.arange(rng.uniform(0, gap), block.length, gap)
         places, _ = block.at(along, at_kerb + 0.2)
         site.plot.scatter(site.some(draw_tree), places, rng.uniform(0, 6.28, len(along)), 0.3)
+    if block.road.speed_mps > 18:
+        return
     busy = style in ("terrace", "park", "carpark") and walk > 1.5
     for _ in range(rng.poisson(block.length / 30 * (1.0 if busy else 0.3))):
         lateral = block.road.half_m + 0.5 + rng.uniform(0, max(walk - 0.8, 0.2))

@@ -106,7 +106,7 @@ class Traffic:
         first, last = path.arc[inside[0]], path.arc[inside[-1]]
         speed = 0.0 if jam else lane.speed_mps * rng.uniform(0.7, 1.15)
         starts, models, along = [], [], last - rng.uniform(2, 30)
-        sparse = 25 / (0.15 + self.busy)
+        sparse = 38 / (0.15 + self.busy)
         while along > first + 6:
             model = self._vehicle(lane.speed_mps)
             if along - 0.5 * model.size_lwh[0] > first:
@@ -216,7 +216,7 @@ class Traffic:
     def _walks(self, road: Road) -> None:
         """People along pavements and across the road."""
         rng, kind = self.rng, self.world.network.kind
-        count = rng.poisson(WALKERS[kind] * (1 + 5 * self.busy))
+        count = rng.poisson(WALKERS[kind] * (0.8 + 4 * self.busy))
         for _ in range(count):
             if rng.random() < 0.25:
                 self._cross(road)

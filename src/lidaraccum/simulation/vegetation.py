@@ -25,18 +25,18 @@ def _shell(count: int, rng: np.random.Generator, inner: float) -> Array:
 def broadleaf(rng: np.random.Generator) -> Mesh:
     """A tree whose crown is several clumps of loose leaves on branches."""
     height = rng.uniform(4.5, 14.0)
-    bole = rng.uniform(1.8, 0.4 * height + 1.2)
+    bole = rng.uniform(0.7, 0.3 * height + 0.8)
     width = rng.uniform(0.25, 0.42) * height
     bark = Finish(Surface.TRUNK, float(rng.uniform(0.15, 0.4)))
     radius = rng.uniform(0.08, 0.03 * height + 0.05)
     parts = [lathe([(1.4 * radius, -0.2), (radius, 0.4), (0.6 * radius, 0.7 * height)], bark, 8)]
     clumps = int(rng.integers(4, 9))
-    leaves = int(rng.uniform(500, 1000))
+    leaves = int(rng.uniform(600, 1200))
     leaf, size = _leaf(rng), rng.uniform(0.12, 0.24)
     for _ in range(clumps):
         angle, out = rng.uniform(0, 2 * np.pi), rng.uniform(0.0, 0.65) * width
         middle = np.array(
-            [out * np.cos(angle), out * np.sin(angle), rng.uniform(bole + 0.6, 0.9 * height)]
+            [out * np.cos(angle), out * np.sin(angle), rng.uniform(bole + 0.4, 0.85 * height)]
         )
         radii = np.array([0.55, 0.55, 0.5]) * width * rng.uniform(0.6, 1.1)
         centres = middle + _shell(leaves // clumps, rng, 0.3) * radii
@@ -100,14 +100,14 @@ def draw_tree(rng: np.random.Generator) -> Mesh:
 
 def bush(rng: np.random.Generator, height: float | None = None) -> Mesh:
     """A round bush, or a few grown together, of any size up to a car's."""
-    height = height or float(rng.uniform(0.4, 2.4))
+    height = height or float(rng.uniform(0.4, 3.2))
     leaf, parts = _leaf(rng, Surface.HEDGE), []
     for _ in range(int(rng.integers(1, 5))):
         tall = height * rng.uniform(0.6, 1.0)
         radii = np.array([*(tall * rng.uniform(0.4, 0.9, 2)), 0.5 * tall])
         shift = np.array([*(rng.uniform(-0.7, 0.7, 2) * height), 0.5 * tall])
         core = blob(tuple(0.72 * radii), tuple(shift), leaf, rng, 0.12)
-        centres = shift + _shell(int(60 + 90 * tall), rng, 0.75) * radii
+        centres = shift + _shell(int(50 + 80 * tall), rng, 0.75) * radii
         parts += [core, flakes(centres, rng.uniform(0.05, 0.2, len(centres)), leaf, rng)]
     return merge(parts)
 
@@ -123,7 +123,7 @@ def tufts(rng: np.random.Generator) -> Mesh:
 
 def hedge(line: Array, rng: np.random.Generator) -> Mesh:
     """A hedge along ground points (K, 3), about a metre apart: bumpy core, leaves about it."""
-    height, width = rng.uniform(0.6, 2.6), rng.uniform(0.5, 1.6)
+    height, width = rng.uniform(0.6, 3.2), rng.uniform(0.5, 1.8)
     neat, leaf = rng.uniform(0.02, 0.18), _leaf(rng, Surface.HEDGE)
     ahead = np.gradient(line[:, :2], axis=0)
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
