@@ -1,0 +1,78 @@
+"""The ground under one frame, as a height map, and how far above it points lie."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+CELL_M = 1.0
+REACH_M = 80.0
+OPENING_CELLS = 7
+"""Things narrower than this stand on the ground; wider ones are hills, or roofs seen from above."""
+
+MAX_STEP_M = 0.6
+"""A cell this far above the lowest ground around it holds no ground."""
+
+_CELLS = int(2 * REACH_M / CELL_M)
+_DEPTH_MM = 1 << 17
+
+
+@dataclass(frozen=True, eq=False)
+class Terrain:
+    """Ground heights on a square grid about the sensor.
+
+    Attributes:
+        heights: (G, G) float64, metres, z of the ground at cell centres, x by row, y by column.
+    """
+
+    heights: NDArray[np.float64]
+
+    def height_above(self, points: NDArray[Any]) -> NDArray[np.float64]:
+        """Height (N,) above the ground of points (N, 3), metres, in the frame's coordinates."""
+        cells = (points[:, :2].T + REACH_M) / CELL_M - 0.5
+        ground = ndimage.map_coordinates(self.heights, cells, order=1, mode="nearest")
+        return points[:, 2] - ground
+
+
+def estimate_terrain(points: NDArray[Any]) -> Terrain:
+    """Ground under the points (N, 3) of one frame, metres, z up, about the sensor.
+
+    Lowest points of cells, opened so that what stands on the ground falls away; cells without
+    ground take the nearest cell's. Stray echoes from below are passed over where a cell has
+    points enough.
+    """
+    low = _low_points(points)
+    known = np.isfinite(low)
+    if not known.any():
+        return Terrain(np.zeros((_CELLS, _CELLS)))
+    eroded = ndimage.minimum_filter(np.where(known, low, np.inf), size=OPENING_CELLS)
+    opened = ndimage.maximum_filter(
+        np.where(np.isfinite(eroded), eroded, -np.inf), size=OPENING_CELLS
+    )
+    with np.errstate(invalid="ignore"):
+        ground = known & (low - opened < MAX_STEP_M)
+    nearest = ndimage.distance_transform_edt(~ground, return_distances=False, return_indices=True)
+    return Terrain(ndimage.median_filter(low[tuple(nearest)], size=3))
+
+
+def _low_points(points: NDArray[Any]) -> NDArray[np.float64]:
+    """Nearly lowest z (G, G) of each cell's points, inf where there are none."""
+    cells = np.floor((points[:, :2] + REACH_M) / CELL_M).astype(np.int64)
+    inside = ((cells >= 0) & (cells < _CELLS)).all(axis=1)
+    # Cell and height packed into one integer sort much faster than a lexical sort of both.
+    millimetres = np.clip(points[inside, 2] * 1000.0, -_DEPTH_MM, _DEPTH_MM).astype(np.int64)
+    packed = np.sort(
+        (cells[inside, 0] * _CELLS + cells[inside, 1]) * (2 * _DEPTH_MM + 1)
+        + (millimetres + _DEPTH_MM)
+    )
+    key, raised = np.divmod(packed, 2 * _DEPTH_MM + 1)
+    starts = np.flatnonzero(np.diff(key, prepend=-1))
+    counts = np.diff(np.append(starts, len(key)))
+    chosen = starts + np.minimum(counts - 1, np.where(counts > 20, 3, 1))
+    low = np.full(_CELLS * _CELLS, np.inf)
+    low[key[starts]] = (raised[chosen] - _DEPTH_MM) / 1000.0
+    return low.reshape(_CELLS, _CELLS)

@@ -1,0 +1,126 @@
+"""What one frame saw: which places its rays passed through, and which they hit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+BoolArray = NDArray[np.bool_]
+
+FINEST_COLUMNS = 1440
+COARSEST_COLUMNS = 180
+FULL_RATIO = 1.5
+"""Columns are as wide as leaves hardly a gap in a row: halving their number must lose so much."""
+
+FINEST_ELEVATION_STEP = np.deg2rad(0.25)
+COARSEST_ELEVATION_STEP = np.deg2rad(2.5)
+MIN_RANGE_M = 1.0
+MARGIN_M = 0.3
+MARGIN_PER_M = 0.01
+"""A ray must end this far behind a place (and this much more per metre of range) to have passed
+through it: more than noise, registration error and uncompensated motion within a sweep."""
+
+MIN_RAYS = 6
+"""Pixels with rays, of the nine about a place, below which nothing is known about it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sighting:
+    """What a frame's rays say about places.
+
+    Attributes:
+        through: (N,) bool: every ray about the place ended well behind it: it was empty.
+        met: (N,) bool: the nearest ray about the place ended there. A place that is neither was
+            hidden or out of view.
+    """
+
+    through: BoolArray
+    met: BoolArray
+
+
+class RangeView:
+    """The range image of one frame, for any pattern of beams.
+
+    Args:
+        points: (N, 3) metres, sensor coordinates; nearer ones than 1 m are the sensor's carrier.
+        elevation_step: Radians between rows of the image, at least the gap between beams;
+            `elevation_gap` measures it.
+    """
+
+    def __init__(self, points: NDArray[Any], elevation_step: float) -> None:
+        self._step = float(np.clip(elevation_step, FINEST_ELEVATION_STEP, COARSEST_ELEVATION_STEP))
+        self._rows = int(np.pi / self._step) + 2
+        self._columns = FINEST_COLUMNS
+        x, y, z = np.ascontiguousarray(points.T, dtype=np.float32)
+        ranges = np.sqrt(x * x + y * y + z * z)
+        pixels = self._pixels(x, y, z, ranges)[ranges > MIN_RANGE_M]
+        flat = np.full(self._rows * self._columns, np.inf, dtype=np.float32)
+        np.minimum.at(flat, pixels, ranges[ranges > MIN_RANGE_M])
+        image = _without_gaps(flat.reshape(self._rows, self._columns))
+        self._columns = image.shape[1]
+        nearest = _over_neighbours(np.minimum, image)
+        rays = _over_neighbours(np.add, np.isfinite(image).astype(np.int8))
+        self._nearest = np.where(rays >= MIN_RAYS, nearest, np.nan).ravel()
+
+    def look(self, points: NDArray[Any]) -> Sighting:
+        """What the frame saw of places (N, 3), metres, in its sensor coordinates."""
+        x, y, z = np.ascontiguousarray(points.T, dtype=np.float32)
+        ranges = np.sqrt(x * x + y * y + z * z)
+        behind = self._nearest[self._pixels(x, y, z, ranges)] - ranges
+        margin = MARGIN_M + MARGIN_PER_M * ranges
+        return Sighting(through=behind > margin, met=np.abs(behind) <= margin)
+
+    def _pixels(
+        self,
+        x: NDArray[np.float32],
+        y: NDArray[np.float32],
+        z: NDArray[np.float32],
+        ranges: NDArray[np.float32],
+    ) -> NDArray[np.int64]:
+        azimuth = np.arctan2(y, x) + np.float32(np.pi)
+        elevation = np.arcsin(np.clip(z / np.maximum(ranges, 1e-6), -1, 1)) + np.float32(np.pi / 2)
+        column = (azimuth * np.float32(self._columns / (2 * np.pi))).astype(np.int64)
+        row = (elevation * np.float32(1 / self._step)).astype(np.int64)
+        return row * self._columns + column % self._columns
+
+
+def _without_gaps(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The image (R, C), inf where no ray went, in columns wide enough for the sensor's rays."""
+    while image.shape[1] > COARSEST_COLUMNS:
+        wider = np.minimum(image[:, ::2], image[:, 1::2])
+        if np.isfinite(image).sum() > FULL_RATIO * np.isfinite(wider).sum():
+            break
+        image = wider
+    return image
+
+
+def _over_neighbours(combine: np.ufunc, image: NDArray[Any]) -> NDArray[Any]:
+    """Combine each pixel of (R, C) with the eight about it; columns close round the sensor."""
+    wide = np.concatenate([image[:, -1:], image, image[:, :1]], axis=1)
+    across = combine(combine(wide[:, :-2], wide[:, 1:-1]), wide[:, 2:])
+    tall = np.concatenate([across[:1], across, across[-1:]])
+    return combine(combine(tall[:-2], tall[1:-1]), tall[2:])
+
+
+def elevation_gap(points: NDArray[Any]) -> float:
+    """Typical angle between neighbouring beams, radians, from points (N, 3) about the sensor.
+
+    In columns of one degree: the span of elevations over the number of distinct ones.
+    """
+    fine = np.deg2rad(0.2)
+    x, y, z = np.ascontiguousarray(points.T, dtype=np.float32)
+    elevation = np.arctan2(z, np.hypot(x, y))
+    column = ((np.arctan2(y, x) + np.float32(np.pi)) * (180 / np.pi)).astype(np.int64)
+    row = ((elevation + np.float32(np.pi / 2)) / fine).astype(np.int64)
+    seen = np.zeros((361, int(np.pi / fine) + 2), dtype=np.bool_)
+    seen[column, row] = True
+    counts = seen.sum(axis=1)
+    full = counts > 4
+    if not full.any():
+        return float(COARSEST_ELEVATION_STEP)
+    last = seen.shape[1] - 1 - seen[:, ::-1].argmax(axis=1)
+    span = last - seen.argmax(axis=1)
+    return float(fine * np.median(span[full] / (counts[full] - 1)))

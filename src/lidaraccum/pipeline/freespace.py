@@ -1,0 +1,122 @@
+"""Free-space evidence: what other frames saw where a frame has its points."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from lidaraccum.data.registered import RegisteredFrame
+from lidaraccum.geometry import rigid
+from lidaraccum.geometry.clustering import connected_cells
+from lidaraccum.geometry.terrain import estimate_terrain
+from lidaraccum.geometry.visibility import RangeView, elevation_gap
+from lidaraccum.pipeline.motion_settings import MotionSettings
+
+HEIGHT_WEIGHT = 0.5
+BEAM_ALLOWANCE_M = 0.1
+"""Heights count half in distances, and less where beams lie far apart, so that one beam gap costs
+no more than this: the next frame's beams hit the same wall at other heights."""
+
+LOW_SHARE = 0.4
+"""Points above this share of the least height count as partners and join what stands on them."""
+
+
+class SightedFrame:
+    """A frame's obstacles (all but ground, sky and the carrier) and what other frames saw there.
+
+    Attributes:
+        registered: The frame and its pose.
+        gap: Radians between neighbouring beams.
+        view: What its rays passed through.
+        rows: (M,) int64: the obstacles' rows among the frame's points.
+        low_rows: (L,) int64: rows of points lower than obstacles but above the ground.
+        near_points: (M + L, 3) float64, metres, sensor coordinates: obstacles, then low points.
+        near_heights: (M + L,) metres above the ground.
+        segments: (M,) int64: each obstacle's cluster within this frame.
+        segment_sizes: (S,) obstacles in each cluster.
+        through: (M,) int16: other frames that saw through the place.
+        met: (M,) int16: other frames that saw something at the place.
+    """
+
+    def __init__(self, registered: RegisteredFrame, settings: MotionSettings) -> None:
+        points = registered.frame.points
+        self.registered = registered
+        self.gap = elevation_gap(points)
+        self.view = RangeView(points, self.gap)
+        heights = estimate_terrain(points).height_above(points)
+        outside = np.einsum("ij,ij->i", points, points) > settings.min_range_m**2
+        standing = outside & (heights < settings.max_height_m)
+        obstacle = heights >= settings.min_height_m
+        self.rows = np.flatnonzero(standing & obstacle)
+        self.low_rows = np.flatnonzero(
+            standing & ~obstacle & (heights > LOW_SHARE * settings.min_height_m)
+        )
+        near = np.concatenate([self.rows, self.low_rows])
+        self.near_points = points[near].astype(np.float64)
+        self.near_heights = heights[near]
+        self.segments = connected_cells(self.points, settings.cell_m)
+        self.segment_sizes = np.bincount(self.segments)
+        self.through = np.zeros(len(self.rows), dtype=np.int16)
+        self.met = np.zeros(len(self.rows), dtype=np.int16)
+
+    @property
+    def index(self) -> int:
+        """Place of the frame in the sequence."""
+        return self.registered.index
+
+    @property
+    def stamp(self) -> float:
+        """Seconds."""
+        return self.registered.frame.stamp
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """(M, 3) obstacles, metres, sensor coordinates."""
+        return self.near_points[: len(self.rows)]
+
+    @property
+    def heights(self) -> NDArray[np.float64]:
+        """(M,) obstacles' heights above the ground, metres."""
+        return self.near_heights[: len(self.rows)]
+
+    @property
+    def world_from_sensor(self) -> rigid.Pose:
+        """(4, 4) pose at the stamp."""
+        return self.registered.world_from_sensor
+
+    @cached_property
+    def sensor_from_world(self) -> rigid.Pose:
+        """(4, 4), the pose's inverse."""
+        return rigid.invert(self.world_from_sensor)
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """Obstacles and low points by `places`."""
+        places = self.places(self.near_points, self.near_heights)
+        return cKDTree(places, balanced_tree=False, compact_nodes=False)
+
+    def places(self, points: NDArray[Any], heights: NDArray[Any]) -> NDArray[np.float64]:
+        """Places (N, 3) to measure distances between.
+
+        Args:
+            points: (N, 3) metres, sensor coordinates.
+            heights: (N,) metres above the ground: hills do not part what is one thing.
+        """
+        spacing = self.gap * np.hypot(points[:, 0], points[:, 1])
+        weight = np.minimum(HEIGHT_WEIGHT, BEAM_ALLOWANCE_M / np.maximum(spacing, 1e-3))
+        return np.column_stack([points[:, 0], points[:, 1], weight * heights])
+
+    def world(self, picked: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Some of the obstacles (K,) in the world, (K, 3) metres."""
+        return rigid.transform(self.world_from_sensor, self.points[picked])
+
+    def watch(self, other: SightedFrame) -> None:
+        """Count what this frame saw at the other frame's obstacles."""
+        sensor_from_other = self.sensor_from_world @ other.world_from_sensor
+        sighting = self.view.look(rigid.transform(sensor_from_other, other.points))
+        other.through += sighting.through
+        other.met += sighting.met

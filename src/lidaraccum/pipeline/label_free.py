@@ -1,0 +1,205 @@
+"""Movers found from geometry alone: no network, no labels, any sensor."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from lidaraccum.data.accumulation import BACKGROUND, MOVING, STILL
+from lidaraccum.data.perceived import PerceivedFrame
+from lidaraccum.data.registered import RegisteredFrame
+from lidaraccum.geometry import rigid
+from lidaraccum.pipeline.association import Association, Track
+from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.motion_settings import BALANCED, MotionSettings
+from lidaraccum.pipeline.objects import find_objects
+from lidaraccum.pipeline.shape import ObjectShape
+
+log = logging.getLogger(__name__)
+
+LOW_REACH_M = 0.2
+"""Low points this near to a mover's obstacles, seen from above, are its wheels and shoes."""
+
+LOST_FRAMES = 3
+FOUND_M = 0.25
+FOUND_SHARE = 0.5
+"""A mover that no window saw is looked for where it should be, in so many frames; there it is when
+so many points, against its last, lie this near to its shape."""
+
+
+class LabelFree:
+    """Finds movers by free-space evidence and motions that explain the points better than none.
+
+    Looks ahead a window and a stride; memory and time do not grow with the sequence. What is
+    movable but has never moved is background: there is nobody here to know.
+    """
+
+    def __init__(self, settings: MotionSettings = BALANCED) -> None:
+        self._settings = settings
+
+    def perceive(self, frames: Iterable[RegisteredFrame]) -> Iterator[PerceivedFrame]:
+        """Each frame once, in order, its movers labelled and placed."""
+        stream = _Stream(self._settings)
+        for registered in frames:
+            yield from stream.push(registered)
+        yield from stream.finish()
+
+
+class _Stream:
+    """The frames in flight: waiting for their windows, then for the windows that confirm them."""
+
+    def __init__(self, settings: MotionSettings) -> None:
+        self._settings = settings
+        self._association = Association(settings)
+        self._waiting: deque[SightedFrame] = deque()
+        self._since_window = 0
+
+    def push(self, registered: RegisteredFrame) -> Iterator[PerceivedFrame]:
+        frame = SightedFrame(registered, self._settings)
+        for other in list(self._waiting)[-(self._settings.window - 1) :]:
+            frame.watch(other)
+            other.watch(frame)
+        self._waiting.append(frame)
+        self._since_window += 1
+        if len(self._waiting) < self._settings.window or not self._is_due():
+            return
+        self._look()
+        while len(self._waiting) >= self._settings.window + self._settings.stride:
+            yield self._release()
+
+    def finish(self) -> Iterator[PerceivedFrame]:
+        if self._since_window and len(self._waiting) > 1:
+            self._look()
+        while self._waiting:
+            yield self._release()
+
+    def _is_due(self) -> bool:
+        first = self._since_window == len(self._waiting)
+        return first or self._since_window >= self._settings.stride
+
+    def _look(self) -> None:
+        window = list(self._waiting)[-self._settings.window :]
+        self._association.link(find_objects(window, self._settings), window)
+        self._since_window = 0
+
+    def _release(self) -> PerceivedFrame:
+        frame = self._waiting.popleft()
+        sure = [track for track in self._association.tracks if self._association.is_sure(track)]
+        canvas = _Canvas(frame)
+        for track in sorted(sure, key=lambda track: -len(track.picked.get(frame.index, ()))):
+            _paint(track, frame, canvas)
+        for track in self._association.tracks:
+            track.forget(frame.index)
+        return canvas.perceived()
+
+
+class _Canvas:
+    """One frame's answer while it is put together."""
+
+    def __init__(self, frame: SightedFrame) -> None:
+        count = len(frame.registered.frame)
+        self._frame = frame
+        self._label = np.full(count, BACKGROUND, dtype=np.uint8)
+        self._instance = np.zeros(count, dtype=np.int32)
+        self._confidence = np.zeros(count, dtype=np.float32)
+        self._confidence[frame.rows] = np.where(
+            frame.through > frame.met, 0.5, 1.0 - 0.5 / (1.0 + frame.met)
+        )
+        self._poses: dict[int, rigid.Pose] = {}
+
+    def free(self, picked: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Those of the picked obstacles (K,) that are no other object's."""
+        return picked[self._instance[self._frame.rows[picked]] == 0]
+
+    def paint(self, track: Track, picked: NDArray[np.int64], label: int) -> None:
+        """Give obstacles (K,), and what is low beside them, to an object."""
+        rows = np.concatenate([self._frame.rows[picked], self._low_beside(picked)])
+        rows = rows[self._instance[rows] == 0]
+        self._label[rows] = label
+        self._instance[rows] = track.instance
+        self._confidence[rows] = min(1.0, 0.5 + 0.5 * track.margin)
+        if label == MOVING:
+            self._poses[track.instance] = track.world_from_object
+
+    def perceived(self) -> PerceivedFrame:
+        """The answer."""
+        return PerceivedFrame(
+            registered=self._frame.registered,
+            label=self._label,
+            instance=self._instance,
+            confidence=self._confidence,
+            world_from_object=self._poses,
+        )
+
+    def _low_beside(self, picked: NDArray[np.int64]) -> NDArray[np.int64]:
+        frame = self._frame
+        if len(frame.low_rows) == 0:
+            return frame.low_rows
+        low = frame.near_points[len(frame.rows) :, :2]
+        distance, _ = cKDTree(frame.points[picked, :2]).query(low, distance_upper_bound=LOW_REACH_M)
+        return frame.low_rows[np.isfinite(distance)]
+
+
+def _paint(track: Track, frame: SightedFrame, canvas: _Canvas) -> None:
+    picked = canvas.free(track.picked.get(frame.index, np.zeros(0, dtype=np.int64)))
+    if len(picked):
+        _follow(track, frame, picked)
+        canvas.paint(track, picked, MOVING)
+        return
+    if track.shape is None or frame.index - track.last_index > LOST_FRAMES:
+        return
+    seconds = frame.stamp - track.last_stamp
+    ahead = rigid.translation(track.velocity * seconds) @ track.world_from_object
+    gone_on = canvas.free(_near_shape(track.shape, ahead, frame))
+    stayed = canvas.free(_near_shape(track.shape, track.world_from_object, frame))
+    label, near, pose = STILL, stayed, track.world_from_object
+    if len(gone_on) > len(stayed):
+        label, near, pose = MOVING, gone_on, ahead
+    if len(near) > FOUND_SHARE * track.points:
+        _settle(track, frame, near, pose)
+        canvas.paint(track, near, label)
+
+
+def _follow(track: Track, frame: SightedFrame, picked: NDArray[np.int64]) -> None:
+    """Place a mover in a frame: predicted from the last, then fitted to its shape."""
+    world = frame.world(picked)
+    velocity = track.velocities[frame.index]
+    if track.shape is None:
+        pose = rigid.translation(world.mean(axis=0))
+        heading = float(np.arctan2(velocity[1], velocity[0]))
+        cosine, sine = np.cos(heading), np.sin(heading)
+        pose[:2, :2] = [[cosine, -sine], [sine, cosine]]
+        track.shape = ObjectShape(rigid.transform(rigid.invert(pose), world))
+    else:
+        shift = velocity * (frame.stamp - track.last_stamp)
+        pose = rigid.translation(shift) @ track.world_from_object
+        own = rigid.transform(rigid.invert(pose), world)
+        fit = track.shape.fit(own)
+        pose = pose @ rigid.invert(fit.correction)
+        track.shape.add(rigid.transform(fit.correction, own))
+    _note(track, frame, pose, len(picked))
+
+
+def _settle(track: Track, frame: SightedFrame, picked: NDArray[np.int64], pose: rigid.Pose) -> None:
+    """Place a mover that no window saw in a frame, by its shape alone."""
+    assert track.shape is not None
+    own = rigid.transform(rigid.invert(pose), frame.world(picked))
+    pose = pose @ rigid.invert(track.shape.fit(own).correction)
+    _note(track, frame, pose, len(picked))
+
+
+def _note(track: Track, frame: SightedFrame, pose: rigid.Pose, points: int) -> None:
+    track.world_from_object = pose
+    track.last_index, track.last_stamp = frame.index, frame.stamp
+    track.points = points
+
+
+def _near_shape(shape: ObjectShape, pose: rigid.Pose, frame: SightedFrame) -> NDArray[np.int64]:
+    """The frame's obstacles (K,) on a shape at a pose."""
+    own = rigid.transform(rigid.invert(pose) @ frame.world_from_sensor, frame.points)
+    return np.flatnonzero(np.isfinite(shape.distances(own, FOUND_M)))

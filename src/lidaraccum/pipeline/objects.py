@@ -1,0 +1,313 @@
+"""Movers of one window: the points' verdict on every hypothesis; standing still wins ties."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from lidaraccum.geometry import rigid
+from lidaraccum.geometry.voxel import thin
+from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.hypotheses import propose
+from lidaraccum.pipeline.motion_settings import MotionSettings
+from lidaraccum.pipeline.suspects import Suspect, Template, find_suspects, make_template
+
+TEMPLATE_POINTS = 80
+FIRST_LOOK_POINTS = 30
+REFINED_HYPOTHESES = 2
+REFINING_STEPS = 3
+
+HIDDEN_COST = 0.7
+THROUGH_COST = 1.5
+"""A point without a partner costs less than one at the gate's edge where it may be hidden, and
+more where the frame saw through its place."""
+
+JOIN_M = 0.4
+WHOLE_SHARE = 0.5
+WHOLE_GROWTH = 2.5
+"""A frame's points this near to the moved cluster are its points; so is all of a cluster of which
+they are more than this share, unless it has so many times the points."""
+
+STANDING_SHARE = 0.1
+STANDING_MARGIN = 0.1
+"""With more than this share of points that were met and never seen through, each is asked whether
+standing costs it so much less than moving."""
+
+SAME_GAP_M = 0.8
+SAME_SPEED_MPS = 0.8
+"""Two movers nearer than this and with velocities as like as this are one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What the points say of H hypotheses, (H,) each, means over points and frames.
+
+    Attributes:
+        cost: Truncated distance to the nearest partner over the gate, see `MotionSettings`.
+        through: Share of points without partner in places that the frame saw through.
+    """
+
+    cost: NDArray[np.float64]
+    through: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class WindowObject:
+    """A mover of one window.
+
+    Attributes:
+        picked: By frame index in the sequence: which of that frame's obstacles (K,).
+        velocity: (3,) m/s, world.
+        centre: (3,) metres, world, of its points in the frame at ``stamp``.
+        stamp: Seconds.
+        margin: How much cheaper this motion is than standing still.
+    """
+
+    picked: Mapping[int, NDArray[np.int64]]
+    velocity: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    stamp: float
+    margin: float
+
+
+def judge(
+    template: Template,
+    velocities: NDArray[np.float64],
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+) -> Verdict:
+    """Try velocities (H, 3), m/s, world, on a cluster, in all other frames of its window."""
+    cost, through = judge_points(template, velocities, frames, settings)
+    return Verdict(cost=cost.mean(axis=1), through=through.mean(axis=1))
+
+
+def judge_points(
+    template: Template,
+    velocities: NDArray[np.float64],
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """As `judge`, point by point: costs (H, P) and shares of frames that saw through (H, P)."""
+    hypotheses, count = len(velocities), len(template.world)
+    heights = np.tile(template.heights, hypotheses)
+    costs, passed = [], []
+    for frame in frames:
+        seconds = frame.stamp - template.stamp
+        if seconds == 0:
+            continue
+        moved = template.world[None] + velocities[:, None] * seconds
+        local = rigid.transform(frame.sensor_from_world, moved.reshape(-1, 3))
+        gate = settings.truncation_m
+        distance, _ = frame.tree.query(frame.places(local, heights), distance_upper_bound=gate)
+        through = np.isinf(distance)
+        through[through] = frame.view.look(local[through]).through
+        alone = np.where(through, THROUGH_COST, HIDDEN_COST)
+        cost = np.where(np.isinf(distance), alone, distance / gate)
+        costs.append(cost.reshape(hypotheses, count))
+        passed.append(through.reshape(hypotheses, count))
+    return np.mean(costs, axis=0), np.mean(passed, axis=0)
+
+
+def refine_velocity(
+    template: Template,
+    velocity: NDArray[np.float64],
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+) -> NDArray[np.float64]:
+    """The velocity (3,) that best takes a cluster onto all other frames together, from a start.
+
+    ICP with one unknown for the whole window: each frame asks for a shift, its points in number
+    and its distance in time are its weight.
+    """
+    refined = velocity.copy()
+    for _ in range(REFINING_STEPS):
+        asked, weight = np.zeros(3), 0.0
+        for frame in frames:
+            seconds = frame.stamp - template.stamp
+            if seconds == 0:
+                continue
+            local = rigid.transform(frame.sensor_from_world, template.world + refined * seconds)
+            distance, partner = frame.tree.query(
+                frame.places(local, template.heights),
+                distance_upper_bound=2 * settings.truncation_m,
+            )
+            hit = np.isfinite(distance)
+            if not hit.any():
+                continue
+            trust = 1 / (0.1 + distance[hit])
+            lag = (frame.near_points[partner[hit]] - local[hit]) * trust[:, None]
+            shift = frame.world_from_sensor[:3, :3] @ (lag.sum(axis=0) / trust.sum())
+            asked += hit.sum() * seconds * shift
+            weight += hit.sum() * seconds**2
+        if weight == 0:
+            break
+        refined[:2] += asked[:2] / weight
+    return refined
+
+
+def find_objects(frames: Sequence[SightedFrame], settings: MotionSettings) -> list[WindowObject]:
+    """The movers of a window whose frames have watched one another."""
+    suspects = find_suspects(frames, settings)
+    taken = {frame.index: np.zeros(len(frame.rows), dtype=np.bool_) for frame in frames}
+    objects: list[WindowObject] = []
+    for suspect in suspects:
+        if taken[frames[suspect.frame].index][suspect.picked].mean() > 0.3:
+            continue
+        found = explain(suspect, suspects, frames, settings)
+        if found is None:
+            continue
+        for index, picked in found.picked.items():
+            taken[index][picked] = True
+        objects.append(found)
+    return join_parts(objects, frames)
+
+
+def explain(
+    suspect: Suspect,
+    suspects: Sequence[Suspect],
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+) -> WindowObject | None:
+    """The suspect as a mover, or None when standing still explains its points as well."""
+    own = frames[suspect.frame]
+    still = np.zeros((1, 3))
+    rough = make_template(own, suspect.picked, FIRST_LOOK_POINTS)
+    if judge(rough, still, frames, settings).cost[0] < settings.margin:
+        return None
+    proposals = propose(suspect, suspects, frames, settings)
+    if len(proposals) == 0:
+        return None
+    order = np.argsort(judge(rough, proposals, frames, settings).cost, kind="stable")
+    template = make_template(own, suspect.picked, TEMPLATE_POINTS)
+    refined = [
+        refine_velocity(rough, proposals[choice], frames, settings)
+        for choice in order[:REFINED_HYPOTHESES]
+    ]
+    rivals = np.concatenate([still, refined])
+    verdict = judge(template, rivals, frames, settings)
+    best = int(verdict.cost.argmin())
+    if not _is_motion(best, rivals, verdict, frames, settings):
+        return None
+    picked = gather(suspect, rivals[best], frames)
+    return WindowObject(
+        picked=without_standing(picked, rivals[best], frames, settings),
+        velocity=rivals[best],
+        centre=suspect.centre,
+        stamp=own.stamp,
+        margin=float(verdict.cost[0] - verdict.cost[best]),
+    )
+
+
+def _is_motion(
+    best: int,
+    rivals: NDArray[np.float64],
+    verdict: Verdict,
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+) -> bool:
+    speed = float(np.linalg.norm(rivals[best]))
+    way = speed * (frames[-1].stamp - frames[0].stamp)
+    return (
+        settings.min_speed_mps < speed < settings.max_speed_mps
+        and way > settings.min_shift_m
+        and verdict.cost[0] - verdict.cost[best] > settings.margin
+        and verdict.cost[best] < settings.max_cost
+        and verdict.through[0] > settings.min_through
+    )
+
+
+def gather(
+    suspect: Suspect, velocity: NDArray[np.float64], frames: Sequence[SightedFrame]
+) -> dict[int, NDArray[np.int64]]:
+    """By frame index: the obstacles (K,) of each frame that the moved suspect lies on."""
+    own = frames[suspect.frame]
+    world, heights = own.world(suspect.picked), own.heights[suspect.picked]
+    gathered = {own.index: suspect.picked}
+    for frame in frames:
+        if frame is own:
+            continue
+        moved = world + velocity * (frame.stamp - own.stamp)
+        local = rigid.transform(frame.sensor_from_world, moved)
+        picked = _points_at(frame, frame.places(local, heights))
+        if len(picked):
+            gathered[frame.index] = picked
+    return gathered
+
+
+def _points_at(frame: SightedFrame, places: NDArray[np.float64]) -> NDArray[np.int64]:
+    own = frame.tree.data[: len(frame.rows)]
+    low, high = places.min(axis=0) - JOIN_M, places.max(axis=0) + JOIN_M
+    about = np.flatnonzero(((own[:, :2] > low[:2]) & (own[:, :2] < high[:2])).all(axis=1))
+    if len(about) == 0:
+        return about
+    distance, _ = cKDTree(places).query(own[about], distance_upper_bound=JOIN_M)
+    close = about[np.isfinite(distance)]
+    sizes = frame.segment_sizes
+    shares = np.bincount(frame.segments[close], minlength=len(sizes)) / sizes
+    whole = (shares > WHOLE_SHARE) & (sizes < WHOLE_GROWTH * len(places))
+    keep = whole[frame.segments]
+    keep[close] = True
+    return np.flatnonzero(keep)
+
+
+def without_standing(
+    picked: Mapping[int, NDArray[np.int64]],
+    velocity: NDArray[np.float64],
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+) -> dict[int, NDArray[np.int64]]:
+    """The mover's points less what stands and only touches it (a parked car it passes)."""
+    kept = {}
+    for frame in frames:
+        if frame.index not in picked:
+            continue
+        mine = picked[frame.index]
+        doubtful = mine[(frame.through[mine] == 0) & (frame.met[mine] > 0)]
+        if len(doubtful) > STANDING_SHARE * len(mine):
+            sample = doubtful[thin(frame.points[doubtful], 0.2)]
+            template = Template(frame.world(sample), frame.heights[sample], frame.stamp)
+            rivals = np.stack([np.zeros(3), velocity])
+            cost, _ = judge_points(template, rivals, frames, settings)
+            stands = cost[0] + STANDING_MARGIN < cost[1]
+            _, nearest = cKDTree(frame.points[sample]).query(frame.points[doubtful])
+            mine = np.setdiff1d(mine, doubtful[stands[nearest]])
+        if len(mine):
+            kept[frame.index] = mine
+    return kept
+
+
+def join_parts(
+    objects: Sequence[WindowObject], frames: Sequence[SightedFrame]
+) -> list[WindowObject]:
+    """Movers that touch and move alike made one; the largest part's motion stands for all."""
+    joined: list[WindowObject] = []
+    for part in objects:
+        for place, whole in enumerate(joined):
+            if _are_one(part, whole, frames):
+                joined[place] = _united(whole, part)
+                break
+        else:
+            joined.append(part)
+    return joined
+
+
+def _are_one(part: WindowObject, whole: WindowObject, frames: Sequence[SightedFrame]) -> bool:
+    if np.linalg.norm(part.velocity - whole.velocity) > SAME_SPEED_MPS:
+        return False
+    for frame in frames:
+        if frame.index in part.picked and frame.index in whole.picked:
+            body = cKDTree(frame.points[whole.picked[frame.index]])
+            distance, _ = body.query(frame.points[part.picked[frame.index]])
+            return bool(distance.min() < SAME_GAP_M)
+    return False
+
+
+def _united(whole: WindowObject, part: WindowObject) -> WindowObject:
+    picked = dict(whole.picked)
+    for index, rows in part.picked.items():
+        picked[index] = np.union1d(picked[index], rows) if index in picked else rows
+    return WindowObject(picked, whole.velocity, whole.centre, whole.stamp, whole.margin)

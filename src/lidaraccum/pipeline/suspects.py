@@ -1,0 +1,94 @@
+"""Clusters of a frame that other frames saw through: what may have moved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidaraccum.geometry.clustering import connected_cells
+from lidaraccum.geometry.voxel import thin
+from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.motion_settings import MotionSettings
+
+MIN_TOP_M = 0.5
+"""Nothing that moves on a street is lower than this."""
+
+
+@dataclass(frozen=True, eq=False)
+class Suspect:
+    """Points of one frame that may be one mover.
+
+    Attributes:
+        frame: Place of the frame in the window.
+        picked: (K,) int64: which of the frame's obstacles.
+        centre: (3,) their mean in the world, metres.
+    """
+
+    frame: int
+    picked: NDArray[np.int64]
+    centre: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.picked)
+
+
+def find_suspects(frames: Sequence[SightedFrame], settings: MotionSettings) -> list[Suspect]:
+    """All suspects of a window's frames, those with most points first."""
+    needed = min(2, len(frames) - 1)
+    found = [
+        Suspect(place, picked, frame.world(picked).mean(axis=0))
+        for place, frame in enumerate(frames)
+        for picked in _suspect_groups(frame, needed, settings)
+    ]
+    return sorted(found, key=lambda suspect: -len(suspect))
+
+
+def _suspect_groups(
+    frame: SightedFrame, needed: int, settings: MotionSettings
+) -> list[NDArray[np.int64]]:
+    if not len(frame.rows):
+        return []
+    seed = (frame.through >= needed) & (frame.through > frame.met)
+    share = np.bincount(frame.segments, seed) / frame.segment_sizes
+    whole = (share >= settings.seed_share)[frame.segments]
+    group = np.where(whole, frame.segments, -1)
+    # Beside something larger that stands, only what was seen through is suspect.
+    part = np.flatnonzero((frame.through > 0) & ~whole)
+    group[part] = len(share) + connected_cells(frame.points[part], settings.cell_m)
+    picked = np.flatnonzero(group >= 0)
+    picked = picked[np.argsort(group[picked], kind="stable")]
+    starts = np.flatnonzero(np.diff(group[picked]))
+    return [
+        rows
+        for rows in np.split(picked, starts + 1)
+        if np.count_nonzero(seed[rows]) >= settings.seeds
+        and len(rows) >= settings.min_points
+        and frame.heights[rows].max() > MIN_TOP_M
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class Template:
+    """A few points that stand for a cluster while motions are tried on it.
+
+    Attributes:
+        world: (P, 3) metres, world, at ``stamp``.
+        heights: (P,) metres above the ground.
+        stamp: Seconds.
+    """
+
+    world: NDArray[np.float64]
+    heights: NDArray[np.float64]
+    stamp: float
+
+
+def make_template(frame: SightedFrame, picked: NDArray[np.int64], count: int) -> Template:
+    """At most ``count`` of the picked obstacles (K,), evenly spread."""
+    kept = thin(frame.points[picked], 0.1)
+    if len(kept) > count:
+        kept = kept[np.linspace(0, len(kept) - 1, count).astype(np.int64)]
+    chosen = picked[kept]
+    return Template(frame.world(chosen), frame.heights[chosen], frame.stamp)
