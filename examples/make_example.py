@@ -21,7 +21,7 @@ from lidaraccum.io.labelled import LabelledSettings, write_labelled_sequence
 from lidaraccum.simulation.drive import DriveSettings, SimulatedSequence, simulate
 
 EXAMPLE = DriveSettings(
-    seed=0,
+    seed=36,
     frames=10,
     sensor="HDL-64E",
     rate_hz=10.0,

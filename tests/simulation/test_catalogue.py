@@ -8,6 +8,7 @@ import pytest
 from lidaraccum.simulation.cars import CAR_TYPES, draw_car
 from lidaraccum.simulation.catalogue import MAKERS, Catalogue
 from lidaraccum.simulation.models import Model
+from lidaraccum.simulation.people import GAIT_PHASES
 from lidaraccum.simulation.surfaces import Surface
 
 LENGTHS_M = {
@@ -46,7 +47,7 @@ def test_cars_have_wheels_windows_and_insides(kind: str) -> None:
 
 def test_legs_swing() -> None:
     walker = MAKERS["pedestrian"](np.random.default_rng(2))
-    assert len(walker.phases) == 8
+    assert len(walker.phases) == GAIT_PHASES
     lengths = [np.ptp(mesh.vertices[mesh.vertices[:, 2] < 0.3, 0]) for mesh in walker.phases]
     assert max(lengths) > min(lengths) + 0.2
 

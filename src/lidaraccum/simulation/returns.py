@@ -38,7 +38,7 @@ class Weather:
 
 def draw_weather(name: str, rng: np.random.Generator) -> Weather:
     """Weather of a name, as thick as drawn."""
-    thick, wet = float(rng.uniform(0.15, 1.0)), float(rng.uniform(0.0, 0.97))
+    thick, wet = float(rng.uniform(0.15, 1.0)), float(1 - 10 ** -rng.uniform(0.0, 3.5))
     if name == "rain":
         return Weather(name, 0.0015 * thick, 0.004 * thick, 25.0, 0.003 * thick, 0.5 + 0.5 * wet)
     if name == "snow":
