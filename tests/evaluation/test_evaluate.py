@@ -15,6 +15,7 @@ from lidaraccum.evaluation.evaluate import (
     MethodReport,
     evaluate,
 )
+from lidaraccum.evaluation.truth import Scope
 from lidaraccum.io.sequences import open_sequence
 from lidaraccum.simulation.drive import DriveSettings, simulate
 
@@ -41,7 +42,7 @@ def estimated(street: Path) -> EvaluationReport:
 
 @pytest.mark.parametrize("target", ["first", "middle", "last"])
 def test_the_oracle_puts_every_point_where_it_belongs(street: Path, target: str) -> None:
-    report = score(street, methods=("oracle",), given_poses=True, target=target, half_width_m=0)
+    report = score(street, methods=("oracle",), given_poses=True, target=target, scope=Scope(0))
     scores = report.methods[0].scores
     assert scores.flow.dynamic.points > 100
     assert scores.flow.static.distribution.largest < 1e-3
@@ -95,7 +96,7 @@ def test_too_few_frames_unknown_methods_and_odd_numbers_are_refused(street: Path
         score(street, length=7)
     with pytest.raises(SettingsError, match="ego-only"):
         EvaluationSettings(methods=("magic",))
-    for changes in ({"length": 1}, {"stride": -1}, {"target": "best"}, {"half_width_m": -1.0}):
+    for changes in ({"length": 1}, {"stride": -1}, {"target": "best"}):
         with pytest.raises(SettingsError):
             EvaluationSettings(**changes)  # type: ignore[arg-type]
 

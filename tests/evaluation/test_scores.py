@@ -10,7 +10,9 @@ import pytest
 from lidaraccum.data.accumulation import MOVING, AccumulatedFrame
 from lidaraccum.data.window import Window
 from lidaraccum.evaluation.scores import Scores, score_window
-from lidaraccum.evaluation.truth import WindowTruth, window_truth
+from lidaraccum.evaluation.truth import Scope, WindowTruth, window_truth
+
+EVERYWHERE = Scope(half_width_m=0)
 
 
 def placed(truth: WindowTruth, shift: float = 0.0) -> list[AccumulatedFrame]:
@@ -39,7 +41,7 @@ def placed(truth: WindowTruth, shift: float = 0.0) -> list[AccumulatedFrame]:
 
 
 def test_the_truth_itself_scores_perfectly(hand_made: Any) -> None:
-    truth = window_truth(Window(hand_made, 0, 3), 0)
+    truth = window_truth(Window(hand_made, 0, 3), EVERYWHERE)
     scores = score_window(placed(truth), truth, 0, 1.5)
     assert scores.flow.everything.epe_mean == 0.0
     assert (scores.flow.static.points, scores.flow.dynamic.points) == (6, 4)
@@ -52,7 +54,7 @@ def test_the_truth_itself_scores_perfectly(hand_made: Any) -> None:
 
 
 def test_a_shift_is_the_epe_of_every_source_frame_and_of_none_but_those(hand_made: Any) -> None:
-    truth = window_truth(Window(hand_made, 0, 3), 0)
+    truth = window_truth(Window(hand_made, 0, 3), EVERYWHERE)
     scores = score_window(placed(truth, 0.2), truth, 0, 0.0)
     assert scores.flow.everything.epe_mean == pytest.approx(0.2)
     assert sorted(scores.by_gap) == [1, 2]
@@ -61,13 +63,13 @@ def test_a_shift_is_the_epe_of_every_source_frame_and_of_none_but_those(hand_mad
 
 def test_gaps_count_both_ways_from_a_target_in_the_middle(hand_made: Any) -> None:
     window = Window(hand_made, 0, 3, "middle")
-    truth = window_truth(window, 0)
+    truth = window_truth(window, EVERYWHERE)
     scores = score_window(placed(truth), truth, window.target, 0.0)
     assert list(scores.by_gap) == [1]
 
 
 def test_two_added_are_both(hand_made: Any) -> None:
-    truth = window_truth(Window(hand_made, 0, 3), 0)
+    truth = window_truth(Window(hand_made, 0, 3), EVERYWHERE)
     one = score_window(placed(truth, 0.1), truth, 0, 1.0)
     other = score_window(placed(truth, 0.3), truth, 0, 3.0)
     both = one + other

@@ -77,6 +77,13 @@ class Lengths(click.ParamType):  # type: ignore[type-arg,unused-ignore]
     metavar="M",
     help="Score this far ahead, behind and aside of the sensor; 0 everywhere.",
 )
+@click.option(
+    "--above-ground",
+    type=float,
+    default=0.0,
+    metavar="M",
+    help="Score only points so far above the ground, as the paper does; 0 all.",
+)
 @click.option("--frames", metavar="A:B:C", help="Only these frames, as a slice: start:stop:step.")
 @click.option("--by-gap", is_flag=True, help="Also EPE by frames between source and target.")
 @click.option("--per-scene", is_flag=True, help="Also averages over sequences, with deviation.")
@@ -111,6 +118,7 @@ def evaluate(**params: Any) -> None:
 def _settings(params: dict[str, Any]) -> EvaluationSettings:
     from lidaraccum.evaluation.baselines import METHODS
     from lidaraccum.evaluation.evaluate import EvaluationSettings
+    from lidaraccum.evaluation.truth import Scope
 
     named = tuple(params["method"])
     return EvaluationSettings(
@@ -120,7 +128,7 @@ def _settings(params: dict[str, Any]) -> EvaluationSettings:
         target=params["target"],
         lengths=params["by_length"] or (),
         given_poses=params["given_poses"],
-        half_width_m=params["half_width"],
+        scope=Scope(params["half_width"], params["above_ground"]),
     )
 
 

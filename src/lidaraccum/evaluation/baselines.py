@@ -10,8 +10,10 @@ from dataclasses import dataclass
 
 from lidaraccum.data.window import Window
 from lidaraccum.errors import SettingsError
+from lidaraccum.evaluation.seen_through import SeenThrough
 from lidaraccum.evaluation.told_masks import ToldMasks, by_centroids, by_icp, by_tracking
 from lidaraccum.evaluation.truth import WindowTruth
+from lidaraccum.pipeline.label_free import LabelFree
 from lidaraccum.pipeline.perception import AllStatic, GivenLabels, Perceiver
 
 ChoosePerceiver = Callable[[Window, WindowTruth], Perceiver]
@@ -62,14 +64,31 @@ def _kalman(window: Window, truth: WindowTruth) -> Perceiver:
     return ToldMasks(window, by_tracking)
 
 
+def _cluster_icp(window: Window, truth: WindowTruth) -> Perceiver:
+    """The label-free path: free space, clusters, votes of point differences, ICP with acceptance.
+
+    After ICP-Flow (Lin and Caesar, CVPR 2024) and DUFOMap; told nothing.
+    """
+    return LabelFree()
+
+
+def _freespace(window: Window, truth: WindowTruth) -> Perceiver:
+    """Motion labels from free space alone, movers left where they were seen; told nothing."""
+    return SeenThrough()
+
+
 METHODS = (
     Method("ego-only", NOTHING, _ego_only),
     Method("chained", NOTHING, _ego_only, chained=True),
+    Method("freespace", NOTHING, _freespace),
+    Method("cluster-icp", NOTHING, _cluster_icp),
     Method("center", MASKS, _center),
     Method("center-icp", MASKS, _center_icp),
     Method("kalman", MASKS, _kalman),
     Method("oracle", "labels, objects and their motions", _oracle),
 )
+ALSO_CALLED = {"label-free": "cluster-icp"}
+"""What `accumulate` calls it."""
 
 
 def method_by_name(name: str) -> Method:
@@ -79,7 +98,7 @@ def method_by_name(name: str) -> Method:
         SettingsError: None is.
     """
     for method in METHODS:
-        if method.name == name:
+        if method.name == ALSO_CALLED.get(name, name):
             return method
     names = ", ".join(method.name for method in METHODS)
     raise SettingsError(f"there is no method {name!r}", hint=f"one of {names}")

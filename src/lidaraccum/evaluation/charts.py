@@ -72,7 +72,7 @@ def line_chart(axes: Axes, lines: Sequence[Line]) -> str:
         path = " ".join(f"{axes.across(x):.1f},{axes.down(y):.1f}" for x, y in shown)
         parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="2"/>')
         parts.append(
-            f'<text x="{WIDTH - RIGHT - 4}" y="{TOP + 14 + 14 * number}" text-anchor="end" '
+            f'<text x="{LEFT + 8}" y="{TOP + 14 + 14 * number}" '
             f'fill="{colour}">{escape(line.name)}</text>'
         )
     return "\n".join([*parts, "</svg>"])

@@ -17,8 +17,7 @@ from lidaraccum.errors import InputError, SettingsError
 from lidaraccum.evaluation.baselines import Method, method_by_name
 from lidaraccum.evaluation.chained import chained_poses
 from lidaraccum.evaluation.scores import Scores, score_window
-from lidaraccum.evaluation.truth import WindowTruth, window_truth
-from lidaraccum.metrics.flow import SQUARE_HALF_WIDTH_M
+from lidaraccum.evaluation.truth import Scope, WindowTruth, window_truth
 from lidaraccum.pipeline.accumulator import AccumulateSettings, Accumulator
 from lidaraccum.registration.odometry import register
 from lidaraccum.registration.settings import RegistrationSettings
@@ -40,8 +39,7 @@ class EvaluationSettings:
         target: One of `TARGETS`: whose coordinates all frames are taken to.
         lengths: Also score windows of these lengths, on the same starts.
         given_poses: Give the pipeline the true poses; otherwise it finds its own.
-        half_width_m: Score points in the square about the sensor in the target frame, half its
-            width; 0 scores everywhere.
+        scope: Which points are scored.
         registration: How frames find their place.
     """
 
@@ -51,14 +49,14 @@ class EvaluationSettings:
     target: str = "first"
     lengths: tuple[int, ...] = ()
     given_poses: bool = False
-    half_width_m: float = SQUARE_HALF_WIDTH_M
+    scope: Scope = field(default_factory=Scope)
     registration: RegistrationSettings = field(default_factory=RegistrationSettings)
 
     def __post_init__(self) -> None:
         if min((self.length, *self.lengths)) < 2:
             raise SettingsError("a window takes at least 2 frames")
-        if self.stride < 0 or self.half_width_m < 0:
-            raise SettingsError("stride and half width must not be negative")
+        if self.stride < 0:
+            raise SettingsError(f"a stride must not be negative, but is {self.stride}")
         if self.target not in TARGETS:
             raise SettingsError(f"there is no target {self.target!r}", hint=f"one of {TARGETS}")
         for name in self.methods:
@@ -172,7 +170,7 @@ class _Gathered:
 
 def score_methods(window: Window, settings: EvaluationSettings) -> Iterator[Scores]:
     """The scores of each method on one window; methods with the same poses share them."""
-    truth = window_truth(window, settings.half_width_m)
+    truth = window_truth(window, settings.scope)
     posed = _register(window, settings, window.true_poses if settings.given_poses else None)
     chained: _Posed | None = None
     for name in settings.methods:
@@ -186,7 +184,7 @@ def score_methods(window: Window, settings: EvaluationSettings) -> Iterator[Scor
 
 @dataclass(frozen=True, eq=False)
 class _Posed:
-    """A window's frames with their poses, and what finding them took."""
+    """A window's frames with their poses, and the CPU seconds that finding them took."""
 
     frames: list[RegisteredFrame]
     seconds: float
@@ -196,26 +194,26 @@ def _register(
     window: Window, settings: EvaluationSettings, given: NDArray[np.float64] | None
 ) -> _Posed:
     frames = list(window)
-    start = time.perf_counter()
+    start = time.process_time()
     registered = list(register(iter(frames), settings.registration, given))
-    return _Posed(registered, time.perf_counter() - start)
+    return _Posed(registered, time.process_time() - start)
 
 
 def _chain(window: Window, settings: EvaluationSettings, posed: _Posed) -> _Posed:
-    start = time.perf_counter()
+    start = time.process_time()
     poses = np.stack([one.world_from_sensor for one in posed.frames])
     chained = chained_poses(list(window), poses, settings.registration)
     frames = _register(window, settings, chained).frames
-    return _Posed(frames, posed.seconds + time.perf_counter() - start)
+    return _Posed(frames, posed.seconds + time.process_time() - start)
 
 
 def _score(window: Window, truth: WindowTruth, method: Method, posed: _Posed) -> Scores:
     settings = AccumulateSettings(reference=str(window.target))
     perceiver = method.perceiver(window, truth)
-    start = time.perf_counter()
+    start = time.process_time()
     accumulator = Accumulator(window, settings, perceiver=perceiver, registered=posed.frames)
     placed = list(accumulator.frames())
-    seconds = posed.seconds + time.perf_counter() - start
+    seconds = posed.seconds + time.process_time() - start
     _check(placed, window, truth)
     return score_window(placed, truth, window.target, seconds)
 

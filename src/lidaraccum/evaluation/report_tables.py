@@ -98,16 +98,18 @@ def summary(report: EvaluationReport) -> list[str]:
     settings, first = report.settings, report.methods[0].scores
     flow = first.flow
     poses = "true poses given" if settings.given_poses else "poses estimated"
+    scope = settings.scope
     square = (
-        f"in the {2 * settings.half_width_m:g} m square about the sensor"
-        if settings.half_width_m
+        f"in the {2 * scope.half_width_m:g} m square about the sensor"
+        if scope.half_width_m
         else "at any distance"
     )
+    ground = f"from {scope.above_ground_m:g} m above it" if scope.above_ground_m else "included"
     told = "; ".join(f"{one.method.name}: {one.method.told}" for one in report.methods)
     return [
         f"{first.windows} windows of {settings.length} frames from {len(report.methods[0].scenes)} "
         f"sequences, target {settings.target}, {poses}.",
-        f"Scored {square}, annotated points only, ground included: {flow.static.points:,} static "
+        f"Scored {square}, annotated points only, ground {ground}: {flow.static.points:,} static "
         f"and {flow.dynamic.points:,} dynamic source points; {first.unknown_points:,} left out "
         "because their object is not seen in the target frame.",
         f"What each is told of the truth: {told}.",

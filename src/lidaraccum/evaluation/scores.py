@@ -44,7 +44,8 @@ class Scores:
         relative: Motions from frame to frame.
         unknown_points: Source points left out of ``flow``: their object is not known in the target
             frame.
-        seconds: What the pipeline took, reading not counted.
+        seconds: CPU time of the pipeline, all threads, reading not counted; so that what else the
+            machine does is not counted either.
     """
 
     windows: int = 0
@@ -85,7 +86,7 @@ class Scores:
 
     @property
     def seconds_per_window(self) -> float:
-        """Mean time the pipeline took; NaN when there is no window."""
+        """Mean CPU time of the pipeline; NaN when there is no window."""
         return ratio(self.seconds, self.windows)
 
 
@@ -98,7 +99,7 @@ def score_window(
         placed: T frames in the target frame's coordinates, all their points in order.
         truth: Of the same frames.
         target: Index of the target frame.
-        seconds: What the pipeline took.
+        seconds: CPU time of the pipeline.
     """
     by_gap: dict[int, FlowByPart] = {}
     unknown = 0

@@ -39,7 +39,7 @@ class Row:
     moving_coverage: float = _column("WCov movers %")
     ape_cm: float = _column("APE cm", 2)
     rpe_cm: float = _column("RPE cm", 2)
-    seconds: float = _column("s/window", 2)
+    seconds: float = _column("CPU s/window", 2)
 
     @classmethod
     def titles(cls) -> list[str]:

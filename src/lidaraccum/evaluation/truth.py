@@ -9,8 +9,28 @@ from numpy.typing import NDArray
 
 from lidaraccum.data.frame import BoolArray, Frame, Labels
 from lidaraccum.data.window import Window
+from lidaraccum.errors import SettingsError
 from lidaraccum.geometry import rigid
-from lidaraccum.metrics.flow import inside_square
+from lidaraccum.geometry.terrain import estimate_terrain
+from lidaraccum.metrics.flow import SQUARE_HALF_WIDTH_M, inside_square
+
+
+@dataclass(frozen=True)
+class Scope:
+    """Which points are scored.
+
+    Attributes:
+        half_width_m: Of the square about the sensor in the target frame; 0 scores everywhere.
+        above_ground_m: Height above the frame's estimated ground from which on points are scored;
+            0 scores the ground too. The paper leaves ground out.
+    """
+
+    half_width_m: float = SQUARE_HALF_WIDTH_M
+    above_ground_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        if min(self.half_width_m, self.above_ground_m) < 0:
+            raise SettingsError("half width and height above ground must not be negative")
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +43,7 @@ class FrameTruth:
         in_target: (N, 3) float64 metres: where it belongs, in the target frame's coordinates. For
             points that are not ``known``: where they would belong if they stood still.
         known: (N,) bool: the truth knows where they belong.
-        scored: (N,) bool: annotated, inside the square, and an echo of something.
+        scored: (N,) bool: annotated, in the scope, and an echo of something.
         dynamic: (N,) bool.
         foreground: (N,) bool.
         instance: (N,) int32, 0 for none.
@@ -53,7 +73,7 @@ class WindowTruth:
     poses: NDArray[np.float64]
 
 
-def window_truth(window: Window, half_width_m: float) -> WindowTruth:
+def window_truth(window: Window, scope: Scope) -> WindowTruth:
     """Work out where the points of a window belong.
 
     What is dynamic in any frame of the window follows its boxes from frame to frame, whatever its
@@ -64,7 +84,7 @@ def window_truth(window: Window, half_width_m: float) -> WindowTruth:
 
     Args:
         window: Labelled frames.
-        half_width_m: Of the square about the sensor in the target frame; 0 scores everywhere.
+        scope: Which of its points are scored.
     """
     labels = [window.labels(index) for index in range(len(window))]
     movers = frozenset[int]().union(*(_dynamic_instances(one) for one in labels))
@@ -74,7 +94,7 @@ def window_truth(window: Window, half_width_m: float) -> WindowTruth:
     anchors = {instance: places[instance] for instance in movers & set(seen) & set(places)}
     poses = rigid.invert(target.world_from_sensor) @ window.true_poses
     frames = [
-        _frame_truth(frame, one, pose, movers, anchors, half_width_m)
+        _frame_truth(frame, one, pose, movers, anchors, scope)
         for frame, one, pose in zip(window, labels, poses, strict=True)
     ]
     return WindowTruth(tuple(frames), movers, poses)
@@ -86,7 +106,7 @@ def _frame_truth(
     target_from_sensor: rigid.Pose,
     movers: frozenset[int],
     anchors: dict[int, rigid.Pose],
-    half_width_m: float,
+    scope: Scope,
 ) -> FrameTruth:
     places = frame.points if labels.points_at_stamp is None else labels.points_at_stamp
     at_stamp = np.asarray(places, dtype=np.float64) + frame.origin
@@ -102,8 +122,11 @@ def _frame_truth(
     scored = frame.returned.copy()
     if labels.annotated is not None:
         scored &= labels.annotated
-    if half_width_m:
-        scored &= inside_square(in_target, half_width_m)
+    if scope.half_width_m:
+        scored &= inside_square(in_target, scope.half_width_m)
+    if scope.above_ground_m:
+        heights = estimate_terrain(frame.points).height_above(frame.points)
+        scored &= heights >= scope.above_ground_m
     return FrameTruth(
         at_stamp, in_target, known, scored, labels.dynamic, labels.foreground, labels.instance
     )
