@@ -119,9 +119,15 @@ registration_options = _stack(
 result_options = _stack(
     click.option(
         "--method",
-        type=click.Choice(["ego-only", "oracle"]),
-        default="ego-only",
-        help="What finds movers: nothing, or the labels that came with the sequence.",
+        type=click.Choice(["label-free", "ego-only", "oracle"]),
+        default="label-free",
+        help="What finds movers: geometry alone, nothing, or labels that came along.",
+    ),
+    click.option(
+        "--preset",
+        type=click.Choice(["conservative", "balanced", "aggressive"]),
+        default="balanced",
+        help="How readily something is called moving.",
     ),
     click.option(
         "--reference",

@@ -40,6 +40,7 @@ def accumulate_settings(params: Mapping[str, Any]) -> AccumulateSettings:
 
     return AccumulateSettings(
         method=params["method"],
+        preset=params["preset"],
         reference=params["reference"],
         registration=RegistrationSettings(deskew=params["deskew"], poses_mode=params["poses_mode"]),
         selection=SelectionSettings(

@@ -16,6 +16,8 @@ from lidaraccum.data.sequence import LabelledSequence, Sequence
 from lidaraccum.errors import InputError, SettingsError
 from lidaraccum.geometry import rigid
 from lidaraccum.pipeline.clock import StageClock
+from lidaraccum.pipeline.label_free import LabelFree
+from lidaraccum.pipeline.motion_settings import PRESETS
 from lidaraccum.pipeline.perception import AllStatic, GivenLabels, Perceiver
 from lidaraccum.pipeline.placing import Reference
 from lidaraccum.pipeline.read_ahead import read_ahead
@@ -28,8 +30,8 @@ from lidaraccum.registration.settings import RegistrationSettings
 
 log = logging.getLogger(__name__)
 
-METHODS = ("ego-only", "oracle")
-"""What finds the movers: nothing, or the labels that came with the sequence."""
+METHODS = ("label-free", "ego-only", "oracle")
+"""What finds the movers: geometry alone, nothing, or the labels that came with the sequence."""
 
 
 @dataclass(frozen=True)
@@ -38,13 +40,15 @@ class AccumulateSettings:
 
     Attributes:
         method: One of `METHODS`.
+        preset: How readily something is called moving, a name in `motion_settings.PRESETS`.
         reference: Whose coordinates the cloud is in: ``first``, ``middle``, ``last``, a frame's
             index (negative from the end), or ``world`` for the coordinates of given poses.
         registration: How frames find their place.
         selection: Which points are kept.
     """
 
-    method: str = "ego-only"
+    method: str = "label-free"
+    preset: str = "balanced"
     reference: str = "first"
     registration: RegistrationSettings = field(default_factory=RegistrationSettings)
     selection: SelectionSettings = field(default_factory=SelectionSettings)
@@ -53,6 +57,10 @@ class AccumulateSettings:
         if self.method not in METHODS:
             raise SettingsError(
                 f"there is no method {self.method!r}", hint=f"one of {', '.join(METHODS)}"
+            )
+        if self.preset not in PRESETS:
+            raise SettingsError(
+                f"there is no preset {self.preset!r}", hint=f"one of {', '.join(PRESETS)}"
             )
 
 
@@ -97,7 +105,7 @@ class Accumulator:
         self._sequence = sequence
         self._settings = settings
         self._reference_index = reference_index(settings.reference, sequence)
-        self._perceiver = perceiver or choose_perceiver(settings.method, sequence)
+        self._perceiver = perceiver or choose_perceiver(settings, sequence)
         self._registered = registered
         self._selection = Selection(settings.selection)
         self._book = TrackBook()
@@ -193,13 +201,15 @@ def reference_index(reference: str, sequence: Sequence) -> int:
     return index % count
 
 
-def choose_perceiver(method: str, sequence: Sequence) -> Perceiver:
+def choose_perceiver(settings: AccumulateSettings, sequence: Sequence) -> Perceiver:
     """What finds the movers of this sequence.
 
     Raises:
         InputError: The method needs labels and the sequence has none.
     """
-    if method == "ego-only":
+    if settings.method == "label-free":
+        return LabelFree(PRESETS[settings.preset])
+    if settings.method == "ego-only":
         return AllStatic()
     if not isinstance(sequence, LabelledSequence):
         raise InputError(

@@ -70,4 +70,5 @@ BALANCED = MotionSettings()
 AGGRESSIVE = MotionSettings(
     margin=0.2, max_cost=0.6, min_through=0.05, min_points=5, seeds=2, sure_margin=0.0
 )
+PRESETS = {"conservative": CONSERVATIVE, "balanced": BALANCED, "aggressive": AGGRESSIVE}
 """From what is called moving surely is, to what moves is surely called so."""
