@@ -84,6 +84,12 @@ class Lengths(click.ParamType):  # type: ignore[type-arg,unused-ignore]
     metavar="M",
     help="Score only points so far above the ground, as the paper does; 0 all.",
 )
+@click.option(
+    "--deskew",
+    type=click.Choice(["auto", "off"]),
+    default="auto",
+    help="Undo the sensor's motion within each frame; where labels take points as recorded, off.",
+)
 @click.option("--frames", metavar="A:B:C", help="Only these frames, as a slice: start:stop:step.")
 @click.option("--by-gap", is_flag=True, help="Also EPE by frames between source and target.")
 @click.option("--per-scene", is_flag=True, help="Also averages over sequences, with deviation.")
@@ -119,6 +125,7 @@ def _settings(params: dict[str, Any]) -> EvaluationSettings:
     from lidaraccum.evaluation.baselines import METHODS
     from lidaraccum.evaluation.evaluate import EvaluationSettings
     from lidaraccum.evaluation.truth import Scope
+    from lidaraccum.registration.settings import RegistrationSettings
 
     named = tuple(params["method"])
     return EvaluationSettings(
@@ -129,6 +136,7 @@ def _settings(params: dict[str, Any]) -> EvaluationSettings:
         lengths=params["by_length"] or (),
         given_poses=params["given_poses"],
         scope=Scope(params["half_width"], params["above_ground"]),
+        registration=RegistrationSettings(deskew=params["deskew"]),
     )
 
 

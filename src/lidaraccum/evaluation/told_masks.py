@@ -28,12 +28,12 @@ class Found:
 
     Attributes:
         ids: For each frame the object (M,) of each moving point, 0 for none.
-        world_then_from_now: For each frame and object: the motion (4, 4), world, from where it was
+        now_from_anchor: For each frame and object: the motion (4, 4), world, from where it was
             in the anchor frame (the nearest to the target that shows it) to where it is now.
     """
 
     ids: Sequence[Ids]
-    world_then_from_now: Sequence[Mapping[int, rigid.Pose]]
+    now_from_anchor: Sequence[Mapping[int, rigid.Pose]]
 
 
 class Finder(Protocol):
@@ -72,7 +72,7 @@ class ToldMasks:
                 ).astype(np.uint8),
                 instance=instance,
                 confidence=np.ones(len(one.frame), dtype=np.float32),
-                world_from_object=found.world_then_from_now[index],
+                world_from_object=found.now_from_anchor[index],
             )
 
 
