@@ -11,7 +11,8 @@ import pytest
 
 from lidaraccum.data.frame import Frame
 from lidaraccum.errors import InputError, MissingDependencyError, SettingsError
-from lidaraccum.evaluation.benchmark import BenchmarkSettings, benchmark, benchmark_markdown
+from lidaraccum.evaluation.benchmark import BenchmarkSettings, benchmark
+from lidaraccum.evaluation.benchmark_report import benchmark_markdown
 from lidaraccum.evaluation.rivals import OPEN3D, RIVALS, Rival
 from lidaraccum.io.sequences import open_sequence
 from lidaraccum.io.settings import InputSettings

@@ -71,6 +71,7 @@ def drive(cloud: Cloud) -> Drive:
                 boxes=(box,),
                 annotated=rng.random(200) < 0.9,
                 semantic=rng.integers(0, 20, 200).astype(np.int16),
+                points_at_stamp=rng.normal(size=(200, 3)).astype(np.float32),
             )
         )
     return Drive(frames, truth)
@@ -102,7 +103,8 @@ def test_the_truth_is_read_back_identically(tmp_path: Path, drive: Drive) -> Non
     back = open_sequence(tmp_path / "out")
     for i in range(3):
         labels, expected = back.labels(i), drive.labels(i)
-        for name in ("foreground", "dynamic", "instance", "annotated", "semantic"):
+        names = ("foreground", "dynamic", "instance", "annotated", "semantic", "points_at_stamp")
+        for name in names:
             np.testing.assert_array_equal(getattr(labels, name), getattr(expected, name))
         np.testing.assert_allclose(labels.world_from_sensor, expected.world_from_sensor, atol=1e-12)
         box, box_expected = labels.boxes[0], expected.boxes[0]

@@ -27,8 +27,9 @@ def benchmark(**params: Any) -> None:
     SEQ is whatever accumulate takes; --frames 0:20 keeps it short. kiss-icp and Open3D are timed
     where they are installed; the extra 'benchmark' brings them.
     """
-    from lidaraccum.evaluation.benchmark import BenchmarkSettings, benchmark_markdown
+    from lidaraccum.evaluation.benchmark import BenchmarkSettings
     from lidaraccum.evaluation.benchmark import benchmark as measure
+    from lidaraccum.evaluation.benchmark_report import benchmark_markdown
     from lidaraccum.pipeline.accumulator import AccumulateSettings
     from lidaraccum.registration.settings import RegistrationSettings
 
