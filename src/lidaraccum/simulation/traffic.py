@@ -25,6 +25,10 @@ WALKERS = {"straight": 1.0, "crossing": 1.4, "square": 2.2, "curved": 0.8, "roun
            "suburban": 0.6, "industrial": 0.4, "bridge": 0.3, "tunnel": 0.2, "rural": 0.15,
            "highway": 0.0}  # fmt: skip
 EGO_LENGTH_M = 4.6
+SHORT_S = 2.5
+"""In drives longer than this movers come from beyond the ground and leave it again."""
+PROBE_S = 0.25
+"""Movers are kept apart at times no further apart than this."""
 
 
 class Traffic:
@@ -42,11 +46,16 @@ class Traffic:
         self.times = ego.trajectory.times
         self.ego = ego
         self.actors: list[Actor] = []
-        self._probe = np.unique(np.linspace(0, len(self.times) - 1, 12).astype(int))
+        lasts = float(self.times[-1] - self.times[0])
+        probes = max(12, int(lasts / PROBE_S))
+        self._probe = np.unique(np.linspace(0, len(self.times) - 1, probes).astype(int))
+        self.extra_s = max(lasts - SHORT_S, 0.0)
         middle = ego.trajectory.places[self._probe, :2]
         yaw = ego.trajectory.angles[self._probe, 0]
         self._taken = [_discs(middle, yaw, EGO_LENGTH_M, 2.2)]
         self.busy = float(rng.beta(1.6, 1.6))
+        gone = float(ego.trajectory.travelled[-1] - ego.trajectory.travelled[0])
+        self._stretch = 1.0 + gone / 60.0 if self.extra_s else 1.0
         self.focus = ego.trajectory.places[len(self.times) // 2, :2]
 
     def populate(self) -> tuple[Actor, ...]:
@@ -69,7 +78,8 @@ class Traffic:
         world = self.world
         trajectory = follow(way, model, self.times, world.terrain)
         places, yaw = trajectory.places[self._probe, :2], trajectory.angles[self._probe, 0]
-        if not world.terrain.covers(places, 4.0).all():
+        covered = world.terrain.covers(places, 4.0)
+        if not (covered.any() if self.extra_s else covered.all()):
             return False
         discs = _discs(places, yaw, model.size_lwh[0], model.size_lwh[1])
         for other in self._taken:
@@ -107,9 +117,9 @@ class Traffic:
         speed = 0.0 if jam else lane.speed_mps * rng.uniform(0.7, 1.15)
         starts, models, along = [], [], last - rng.uniform(2, 30)
         sparse = 38 / (0.15 + self.busy)
-        while along > first + 6:
+        while along > first + 6 - speed * self.extra_s:
             model = self._vehicle(lane.speed_mps)
-            if along - 0.5 * model.size_lwh[0] > first:
+            if along - 0.5 * model.size_lwh[0] > first - speed * self.extra_s:
                 starts.append(along - 0.5 * model.size_lwh[0])
                 models.append(model)
             gap = (
@@ -183,12 +193,15 @@ class Traffic:
 
     def _near(self, path: Path, spread: float = 45.0) -> float:
         """Metres along a path of some place not far from the ego."""
-        return path.nearest(self.focus) + self.rng.normal(0, 0.5) * spread
+        focus = self.focus
+        if self.extra_s:
+            focus = self.ego.trajectory.places[self.rng.integers(len(self.times)), :2]
+        return path.nearest(focus) + self.rng.normal(0, 0.5) * spread
 
     def _edges(self, road: Road) -> None:
         """Cyclists and the like at the right edge of the lanes, and overtakers."""
         rng, hand = self.rng, self.world.network.hand
-        count = rng.poisson(1.2 * self.busy + 0.2) if road.speed_mps < 20 else 0
+        count = rng.poisson((1.2 * self.busy + 0.2) * self._stretch) if road.speed_mps < 20 else 0
         for _ in range(count):
             away = bool(rng.random() < 0.5)
             lateral = hand * (road.drive_m - rng.uniform(0.4, 0.9))
@@ -216,7 +229,7 @@ class Traffic:
     def _walks(self, road: Road) -> None:
         """People along pavements and across the road."""
         rng, kind = self.rng, self.world.network.kind
-        count = rng.poisson(WALKERS[kind] * (0.8 + 4 * self.busy))
+        count = rng.poisson(WALKERS[kind] * (0.8 + 4 * self.busy) * self._stretch)
         for _ in range(count):
             if rng.random() < 0.25:
                 self._cross(road)
@@ -264,7 +277,7 @@ class Traffic:
     def _parking(self) -> None:
         """Cars that pull out, back out of a bay, or manoeuvre slowly off the road."""
         rng, network = self.rng, self.world.network
-        for _ in range(rng.poisson(0.8 + 0.8 * self.busy)):
+        for _ in range(rng.poisson((0.8 + 0.8 * self.busy) * self._stretch)):
             road = network.roads[int(rng.integers(len(network.roads)))]
             place, heading = road.centre.at(self._near(road.centre, 30.0))
             side = float(rng.choice([-1, 1]))
