@@ -140,6 +140,16 @@ def test_wrong_given_poses_are_doubted(straight: Any) -> None:
     assert registered[7].quality.doubts
 
 
+@pytest.mark.parametrize("mistake", ["all identity", "inverted"])
+def test_poses_of_something_else_are_doubted_at_once(straight: Any, mistake: str) -> None:
+    wrong = {
+        "all identity": np.tile(np.eye(4), (len(straight.poses), 1, 1)),
+        "inverted": rigid.invert(straight.poses),
+    }
+    registered = list(register(straight.frames, given=wrong[mistake]))
+    assert "other than the given poses" in registered[1].quality.doubts[-1]
+
+
 def test_rough_given_poses_are_refined(straight: Any) -> None:
     given = straight.poses.copy()
     given[1:, :3, 3] += np.random.default_rng(4).normal(0, 0.1, (len(given) - 1, 3))

@@ -21,7 +21,12 @@ from lidaraccum.registration.pace import Pace
 from lidaraccum.registration.scan import StaticMask, usable_points
 from lidaraccum.registration.settings import RegistrationSettings
 from lidaraccum.registration.sweep import SweepDetector
-from lidaraccum.registration.tracker import MAX_ACCELERATION, SMOOTH_M, Tracker
+from lidaraccum.registration.tracker import (
+    CONTRADICTION_M,
+    MAX_ACCELERATION,
+    SMOOTH_M,
+    Tracker,
+)
 
 WINDOW = 5
 """Frames looked at together for the motion within a sweep."""
@@ -68,7 +73,12 @@ def register(
     stream = iter(enumerate(frames))
     opening = list(islice(stream, settings.lookahead))
     odometry = Odometry(settings, given, static_mask)
-    yield from odometry.open(opening)
+    opened = odometry.open(opening)
+    if given is not None and settings.poses_mode == "given":
+        # Poses of another drive, inverted or all identity show in the first steps already.
+        free = Odometry(settings, None, static_mask).open(opening)
+        opened = compared(opened, free)
+    yield from opened
     count = len(opening)
     del opening
     for index, frame in stream:
@@ -76,6 +86,28 @@ def register(
         yield odometry.follow(index, frame)
     if given is not None and len(given) != count:
         raise InputError(f"there are {len(given)} poses for {count} frames")
+
+
+def compared(held: list[RegisteredFrame], free: list[RegisteredFrame]) -> list[RegisteredFrame]:
+    """Frames at their given poses, doubted where the points alone say another step."""
+    frames = held[:1]
+    for (held_before, held_now), (free_before, free_now) in zip(
+        pairwise(held), pairwise(free), strict=True
+    ):
+        given_m = _step(held_before, held_now)
+        found_m = _step(free_before, free_now)
+        away_m = float(np.linalg.norm(given_m - found_m))
+        if away_m < CONTRADICTION_M or free_now.quality.doubts:
+            frames.append(held_now)
+            continue
+        contradiction = f"the points say a step {away_m:.1f} m other than the given poses"
+        quality = replace(held_now.quality, doubts=(*held_now.quality.doubts, contradiction))
+        frames.append(replace(held_now, quality=quality))
+    return frames
+
+
+def _step(before: RegisteredFrame, now: RegisteredFrame) -> NDArray[np.float64]:
+    return (rigid.invert(before.world_from_sensor) @ now.world_from_sensor)[:3, 3]
 
 
 class Odometry:

@@ -60,6 +60,11 @@ class Expectation:
     known: bool
 
 
+CONTRADICTION_M = 0.3
+CONTRADICTION_SHARE = 1.1
+"""Points that fit so much better so far from a given pose contradict it."""
+
+
 class Tracker:
     """The local map, the last pose on it and the last motion."""
 
@@ -101,8 +106,14 @@ class Tracker:
         steps = self._steps_to(index, raw)
         self.twist = self._twist_to(pose, steps)
         scan = self._prepare(index, raw, usable)
-        located = Located("given", assess(self._surface, scan.source(self.twist), pose))
+        source = scan.source(self.twist)
+        located = Located("given", assess(self._surface, source, pose))
         quality = self._judge.judge(located, self._speed(pose, steps))
+        rival = refine(self._surface, source, Hypothesis("given", pose)).alignment
+        away_m = float(np.linalg.norm(rival.world_from_sensor[:3, 3] - pose[:3, 3]))
+        if away_m > CONTRADICTION_M and rival.score > CONTRADICTION_SHARE * located.alignment.score:
+            contradiction = f"the points fit clearly better {away_m:.1f} m from the given pose"
+            quality = replace(quality, doubts=(*quality.doubts, contradiction))
         return self._remember(scan, self.twist, pose, quality)
 
     def follow(
