@@ -37,10 +37,10 @@ HOMES_OF = {
         "evaluation/rivals",
     },
     "kiss_icp": {"evaluation/rivals"},
-    "small_gicp": {"registration"},
     "laspy": {"io"},
     "plyfile": {"io"},
     "torch": {"model", "training", "pipeline/perception"},
+    "safetensors": {"model/checkpoint"},
     "tqdm": {"cli", "batch", "training"},
     "scipy": {"geometry", "registration", "simulation", "pipeline", "metrics", "evaluation"},
 }

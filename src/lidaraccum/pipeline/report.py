@@ -136,5 +136,5 @@ class FrameTally:
         for doubt in self.doubtful[:DOUBTS_SHOWN]:
             said.append(f"the pose of frame {doubt.frame} is doubtful: {'; '.join(doubt.doubts)}")
         if len(self.doubtful) > DOUBTS_SHOWN:
-            said.append(f"{len(self.doubtful) - DOUBTS_SHOWN} more poses are doubtful")
+            said.append(f"doubtful poses beyond these: {len(self.doubtful) - DOUBTS_SHOWN}")
         return tuple(said)

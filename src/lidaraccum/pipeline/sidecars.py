@@ -14,7 +14,7 @@ from lidaraccum.io.sequences import FileSequence
 from lidaraccum.pipeline.accumulator import Accumulator
 from lidaraccum.pipeline.report import AccumulationReport
 
-DECIDING_PACKAGES = ("numpy", "scipy", "small_gicp", "laspy", "plyfile")
+DECIDING_PACKAGES = ("numpy", "scipy", "laspy", "plyfile")
 """The packages whose version may change a result."""
 
 
