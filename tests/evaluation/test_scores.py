@@ -9,6 +9,7 @@ import pytest
 
 from lidaraccum.data.accumulation import MOVING, AccumulatedFrame
 from lidaraccum.data.window import Window
+from lidaraccum.evaluation.categories import CAR
 from lidaraccum.evaluation.scores import Scores, score_window
 from lidaraccum.evaluation.truth import Scope, WindowTruth, window_truth
 
@@ -58,6 +59,8 @@ def test_a_shift_is_the_epe_of_every_source_frame_and_of_none_but_those(hand_mad
     scores = score_window(placed(truth, 0.2), truth, 0, 0.0)
     assert scores.flow.everything.epe_mean == pytest.approx(0.2)
     assert sorted(scores.by_gap) == [1, 2]
+    assert scores.by_speed.dynamic_error[CAR] == pytest.approx((0.4 / 6.0), rel=1e-3)
+    assert scores.by_speed.points.sum() == 10
     assert sum(flow.everything.points for flow in scores.by_gap.values()) == 10
 
 

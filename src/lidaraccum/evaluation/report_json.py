@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lidaraccum.evaluation import paper
+from lidaraccum.evaluation.categories import CATEGORIES
 from lidaraccum.evaluation.evaluate import EvaluationReport, MethodReport
 from lidaraccum.evaluation.report_page import ECDF_AT_M
 from lidaraccum.evaluation.report_tables import PARTS, epe_by_gap
@@ -39,6 +40,12 @@ def _method(one: MethodReport) -> dict[str, Any]:
         "unknown_points": scores.unknown_points,
         "scores": asdict(row_of(one.method.name, scores)),
         "three_way_epe_m": {**asdict(flow.three_way), "mean": flow.three_way.mean},
+        "bucket_normalised": {
+            "categories": list(CATEGORIES),
+            "static_epe_m": scores.by_speed.static_epe.tolist(),
+            "dynamic_error": scores.by_speed.dynamic_error.tolist(),
+            "mean_dynamic_error": scores.by_speed.mean_dynamic_error,
+        },
         "rotation_error_deg": math.degrees(scores.absolute.rotation.mean),
         "instances": {
             "iou_above": list(IOU_THRESHOLDS),

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from lidaraccum.evaluation import paper
+from lidaraccum.evaluation.categories import CATEGORIES
 from lidaraccum.evaluation.evaluate import EvaluationReport, MethodReport
 from lidaraccum.evaluation.table import Row, SceneRow, number, row_of, scene_row_of
 
@@ -39,6 +40,7 @@ def tables_of(report: EvaluationReport, sections: Sections) -> list[Table]:
     """All tables of a report, the paper's rows beside ours."""
     rows = [row_of(one.method.name, one.scores) for one in report.methods]
     tables = [Table("Scores", Row.titles(), [row.cells() for row in (*rows, *paper.ROWS)])]
+    tables.append(_modern(report))
     if sections.gaps:
         tables.append(_by_gap(report))
     if sections.scenes:
@@ -50,6 +52,20 @@ def tables_of(report: EvaluationReport, sections: Sections) -> list[Table]:
     if report.settings.lengths:
         tables.append(_by_length(report))
     return tables
+
+
+def _modern(report: EvaluationReport) -> Table:
+    """Three-way EPE and bucket-normalised error, the scores of the Argoverse 2 challenges."""
+    titles = ["", "FD cm", "FS cm", "BS cm", "three-way cm", *CATEGORIES[1:], "mean"]
+    rows = []
+    for one in report.methods:
+        three, speed = one.scores.flow.three_way, one.scores.by_speed
+        parts = (three.foreground_dynamic, three.foreground_static, three.background_static)
+        errors = [*speed.dynamic_error[1:].tolist(), speed.mean_dynamic_error]
+        cells = [number(100 * value, 2) for value in (*parts, three.mean)]
+        rows.append([one.method.name, *cells, *(number(value, 3) for value in errors)])
+    heading = "Three-way EPE; dynamic error over way gone, by kind and speed (1: as if all stood)"
+    return Table(heading, titles, rows)
 
 
 def gaps_of(report: EvaluationReport) -> list[int]:

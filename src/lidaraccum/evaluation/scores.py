@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.data.accumulation import BACKGROUND, MOVING, AccumulatedFrame
+from lidaraccum.evaluation.categories import CATEGORIES
 from lidaraccum.evaluation.truth import FrameTruth, WindowTruth
 from lidaraccum.metrics import association, segmentation
 from lidaraccum.metrics.association import AssociationScore, keep_majority
 from lidaraccum.metrics.averages import ratio
-from lidaraccum.metrics.flow import flow_errors
+from lidaraccum.metrics.flow import FlowErrors, flow_errors
 from lidaraccum.metrics.flow_parts import FlowByPart, summarise_by_part
+from lidaraccum.metrics.flow_speeds import FlowBySpeed, summarise_by_speed
 from lidaraccum.metrics.segmentation import SegmentationCounts
 from lidaraccum.metrics.trajectory import (
     PoseErrors,
@@ -36,6 +39,7 @@ class Scores:
         windows: How many.
         flow: Of source points, to where they belong in the target frame.
         by_gap: The same by frames between source and target.
+        by_speed: The same by kind of object and true speed.
         motion: Moving or not, points of all frames.
         foreground: Movable or not, points of all frames.
         association: Instances over all frames of a window, all objects.
@@ -51,6 +55,7 @@ class Scores:
     windows: int = 0
     flow: FlowByPart = field(default_factory=_no_flow)
     by_gap: Mapping[int, FlowByPart] = field(default_factory=dict)
+    by_speed: FlowBySpeed = field(default_factory=lambda: FlowBySpeed.pool((), CATEGORIES))
     motion: SegmentationCounts = field(default_factory=SegmentationCounts)
     foreground: SegmentationCounts = field(default_factory=SegmentationCounts)
     association: AssociationScore = field(default_factory=lambda: AssociationScore.pool(()))
@@ -74,6 +79,7 @@ class Scores:
                 gap: FlowByPart.pool(one.by_gap[gap] for one in (self, other) if gap in one.by_gap)
                 for gap in gaps
             },
+            by_speed=self.by_speed + other.by_speed,
             motion=self.motion + other.motion,
             foreground=self.foreground + other.foreground,
             association=self.association + other.association,
@@ -102,12 +108,17 @@ def score_window(
         seconds: CPU time of the pipeline.
     """
     by_gap: dict[int, FlowByPart] = {}
+    by_speed: list[FlowBySpeed] = []
     unknown = 0
     for index, (frame, true) in enumerate(zip(placed, truth.frames, strict=True)):
         if index == target:
             continue
         gap = abs(index - target)
-        flow = _flow(frame, true)
+        errors = _errors(frame, true)
+        flow = summarise_by_part(errors, *_of_known(true, true.dynamic, true.foreground))
+        way_m, category = _of_known(true, true.way_m, true.category)
+        seconds_apart = frame.stamp - placed[target].stamp
+        by_speed.append(summarise_by_speed(errors, way_m, seconds_apart, category, CATEGORIES))
         by_gap[gap] = by_gap[gap] + flow if gap in by_gap else flow
         unknown += int(np.count_nonzero(true.scored & ~true.known))
     estimated = np.stack([frame.reference_from_sensor for frame in placed])
@@ -118,6 +129,7 @@ def score_window(
         windows=1,
         flow=FlowByPart.pool(by_gap.values()),
         by_gap=by_gap,
+        by_speed=FlowBySpeed.pool(by_speed, CATEGORIES),
         motion=SegmentationCounts.pool(map(_motion, placed, truth.frames)),
         foreground=SegmentationCounts.pool(map(_foreground, placed, truth.frames)),
         association=whole,
@@ -129,11 +141,15 @@ def score_window(
     )
 
 
-def _flow(frame: AccumulatedFrame, true: FrameTruth) -> FlowByPart:
-    rows = np.flatnonzero(true.scored & true.known)
-    start = true.at_stamp[rows]
-    errors = flow_errors(frame.points[rows] - start, true.in_target[rows] - start)
-    return summarise_by_part(errors, true.dynamic[rows], true.foreground[rows])
+def _of_known(true: FrameTruth, *values: NDArray[Any]) -> list[NDArray[Any]]:
+    """Only the rows whose place is scored and known."""
+    rows = true.scored & true.known
+    return [one[rows] for one in values]
+
+
+def _errors(frame: AccumulatedFrame, true: FrameTruth) -> FlowErrors:
+    put, start, goal = _of_known(true, frame.points, true.at_stamp, true.in_target)
+    return flow_errors(put - start, goal - start)
 
 
 def _motion(frame: AccumulatedFrame, true: FrameTruth) -> SegmentationCounts:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from lidaraccum.data.frame import BoolArray, Frame, Labels
 from lidaraccum.data.window import Window
 from lidaraccum.errors import SettingsError
+from lidaraccum.evaluation.categories import point_categories
 from lidaraccum.geometry import rigid
 from lidaraccum.geometry.terrain import estimate_terrain
 from lidaraccum.metrics.flow import SQUARE_HALF_WIDTH_M, inside_square
@@ -47,6 +48,9 @@ class FrameTruth:
         dynamic: (N,) bool.
         foreground: (N,) bool.
         instance: (N,) int32, 0 for none.
+        category: (N,) int, index in `categories.CATEGORIES`.
+        way_m: (N,) metres it goes over ground from the frame's stamp to the target's, 0 where it
+            stands or is not known.
     """
 
     at_stamp: NDArray[np.float64]
@@ -56,6 +60,8 @@ class FrameTruth:
     dynamic: BoolArray
     foreground: BoolArray
     instance: NDArray[np.int32]
+    category: NDArray[np.int64]
+    way_m: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +116,8 @@ def _frame_truth(
 ) -> FrameTruth:
     places = frame.points if labels.points_at_stamp is None else labels.points_at_stamp
     at_stamp = np.asarray(places, dtype=np.float64) + frame.origin
-    in_target = rigid.transform(target_from_sensor, at_stamp)
+    standing = rigid.transform(target_from_sensor, at_stamp)
+    in_target = standing.copy()
     known = ~np.isin(labels.instance, list(movers)) & ~labels.dynamic
     boxes = _boxes(labels)
     for instance, target_from_object in anchors.items():
@@ -128,7 +135,15 @@ def _frame_truth(
         heights = estimate_terrain(frame.points).height_above(frame.points)
         scored &= heights >= scope.above_ground_m
     return FrameTruth(
-        at_stamp, in_target, known, scored, labels.dynamic, labels.foreground, labels.instance
+        at_stamp=at_stamp,
+        in_target=in_target,
+        known=known,
+        scored=scored,
+        dynamic=labels.dynamic,
+        foreground=labels.foreground,
+        instance=labels.instance,
+        category=point_categories(labels),
+        way_m=np.linalg.norm(in_target - standing, axis=1),
     )
 
 
