@@ -136,9 +136,9 @@ def test_an_empty_frame_is_no_trouble(busy_street: Any) -> None:
 
 
 def test_presets_trade_recall_for_precision(look: Any, new_mover: Any) -> None:
-    slow = new_mover(low=(12.0, -3.0, 0.0), size=(0.5, 0.5, 1.7), velocity=(0.0, 1.2, 0.0))
-    far = new_mover(low=(45.0, -3.0, 0.0), size=(1.8, 0.6, 1.7), velocity=(-5.0, 0.0, 0.0))
-    street = look([slow, far], count=7)
+    quick = new_mover(low=(35.0, -3.0, 0.0), size=(0.6, 0.6, 1.7), velocity=(0.0, 4.0, 0.0))
+    far = new_mover(low=(38.0, -6.0, 0.0), size=(1.8, 0.6, 1.7), velocity=(-5.0, 0.0, 0.0))
+    street = look([quick, far], count=7)
     said = [
         sum(int((frame.label == MOVING).sum()) for frame in perceive(street.frames, preset))
         for preset in (CONSERVATIVE, BALANCED, AGGRESSIVE)

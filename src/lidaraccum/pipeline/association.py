@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lidaraccum.geometry import rigid
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
-from lidaraccum.pipeline.objects import WindowObject
+from lidaraccum.pipeline.objects import Expectation, WindowObject
 from lidaraccum.pipeline.shape import ObjectShape
 
 OVERLAP = 0.3
@@ -61,6 +61,11 @@ class Track:
     last_index: int = -1
     last_stamp: float = -np.inf
     points: int = 0
+
+    @property
+    def expectation(self) -> Expectation:
+        """Where it was last and how it moved."""
+        return Expectation(self.centre, self.velocity, self.stamp)
 
     def agrees(self, velocity: NDArray[np.float64]) -> bool:
         """Whether a velocity (3,) can be this mover's in the next window."""
@@ -120,7 +125,7 @@ class Association:
 def _same(found: WindowObject, tracks: Sequence[Track]) -> Track | None:
     best, most = None, OVERLAP
     for track in tracks:
-        if np.linalg.norm(_expected(track, found.stamp) - found.centre) > FAR_M:
+        if np.linalg.norm(track.expectation.centre_at(found.stamp) - found.centre) > FAR_M:
             continue
         shares = [
             len(np.intersect1d(picked, track.picked[index]))
@@ -139,12 +144,7 @@ def _nearest_lost(found: WindowObject, tracks: Sequence[Track]) -> Track | None:
     for track in tracks:
         if track.picked.keys() & found.picked.keys() or not track.agrees(found.velocity):
             continue
-        away = float(np.linalg.norm((_expected(track, found.stamp) - found.centre)[:2]))
+        away = float(np.linalg.norm((track.expectation.centre_at(found.stamp) - found.centre)[:2]))
         if away < nearest:
             best, nearest = track, away
     return best
-
-
-def _expected(track: Track, stamp: float) -> NDArray[np.float64]:
-    """Where a track's centre (3,) must be by now."""
-    return track.centre + track.velocity * (stamp - track.stamp)

@@ -99,6 +99,12 @@ class SightedFrame:
         places = self.places(self.near_points, self.near_heights)
         return cKDTree(places, balanced_tree=False, compact_nodes=False)
 
+    @cached_property
+    def level(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The obstacles' x and y (M,) each, metres: to ask of all of them at once, quickly."""
+        x, y = np.ascontiguousarray(self.points[:, :2].T)
+        return x, y
+
     def places(self, points: NDArray[Any], heights: NDArray[Any]) -> NDArray[np.float64]:
         """Places (N, 3) to measure distances between.
 

@@ -89,8 +89,9 @@ def _differences(template: Template, other: SightedFrame, reach: float) -> NDArr
     local = rigid.transform(other.sensor_from_world, template.world)
     centre = local.mean(axis=0)
     radius = reach + np.linalg.norm(local - centre, axis=1).max()
-    away = ((other.points[:, :2] - centre[:2]) ** 2).sum(axis=1)
-    rows = np.flatnonzero((other.through > 0) & (away < radius**2))
+    rows = np.flatnonzero(other.through)
+    away = ((other.points[rows, :2] - centre[:2]) ** 2).sum(axis=1)
+    rows = rows[away < radius**2]
     rows = rows[:: len(rows) // (5 * VOTE_POINTS) + 1]
     differences = other.points[rows][None, :, :2] - local[:, None, :2]
     alike = np.abs(other.heights[rows][None] - template.heights[:, None]) < VOTE_HEIGHT_M

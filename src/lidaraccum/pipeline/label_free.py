@@ -32,6 +32,9 @@ FOUND_SHARE = 0.5
 so many points, against its last, lie this near to its shape."""
 
 
+_NONE = np.zeros(0, dtype=np.int64)
+
+
 class LabelFree:
     """Finds movers by free-space evidence and motions that explain the points better than none.
 
@@ -84,7 +87,8 @@ class _Stream:
 
     def _look(self) -> None:
         window = list(self._waiting)[-self._settings.window :]
-        self._association.link(find_objects(window, self._settings), window)
+        expected = [track.expectation for track in self._association.tracks]
+        self._association.link(find_objects(window, self._settings, expected), window)
         self._since_window = 0
 
     def _release(self) -> PerceivedFrame:
@@ -92,7 +96,7 @@ class _Stream:
         sure = [track for track in self._association.tracks if self._association.is_sure(track)]
         canvas = _Canvas(frame)
         for track in sorted(sure, key=lambda track: -len(track.picked.get(frame.index, ()))):
-            _paint(track, frame, canvas)
+            _paint(track, frame, canvas, self._settings.box_growth)
         for track in self._association.tracks:
             track.forget(frame.index)
         return canvas.perceived()
@@ -145,11 +149,13 @@ class _Canvas:
         return frame.low_rows[np.isfinite(distance)]
 
 
-def _paint(track: Track, frame: SightedFrame, canvas: _Canvas) -> None:
-    picked = canvas.free(track.picked.get(frame.index, np.zeros(0, dtype=np.int64)))
+def _paint(track: Track, frame: SightedFrame, canvas: _Canvas, box_growth: float) -> None:
+    picked = canvas.free(track.picked.get(frame.index, _NONE))
     if len(picked):
         _follow(track, frame, picked)
-        canvas.paint(track, picked, MOVING)
+        canvas.paint(
+            track, np.union1d(picked, canvas.free(_in_box(track, frame, box_growth))), MOVING
+        )
         return
     if track.shape is None or frame.index - track.last_index > LOST_FRAMES:
         return
@@ -197,6 +203,17 @@ def _note(track: Track, frame: SightedFrame, pose: rigid.Pose, points: int) -> N
     track.world_from_object = pose
     track.last_index, track.last_stamp = frame.index, frame.stamp
     track.points = points
+
+
+def _in_box(track: Track, frame: SightedFrame, growth: float) -> NDArray[np.int64]:
+    """The frame's obstacles (K,) within the mover's box, where nothing else can be.
+
+    None at all when they would outnumber those known to be its own: then the box is wrong.
+    """
+    assert track.shape is not None
+    object_from_sensor = rigid.invert(track.world_from_object) @ frame.world_from_sensor
+    inside = track.shape.holds(rigid.transform(object_from_sensor, frame.points))
+    return np.flatnonzero(inside) if inside.sum() < growth * track.points else _NONE
 
 
 def _near_shape(shape: ObjectShape, pose: rigid.Pose, frame: SightedFrame) -> NDArray[np.int64]:

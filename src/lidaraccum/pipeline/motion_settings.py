@@ -34,10 +34,12 @@ class MotionSettings:
         min_through: Share of its points that the other frames must have seen through, were it
             standing still.
         sure_margin: With so much margin one window is enough; with less, two must agree.
+        box_growth: A mover takes all that is inside the box of what it has shown, unless that
+            makes so many times its points.
     """
 
-    window: int = 5
-    stride: int = 2
+    window: int = 9
+    stride: int = 4
     min_range_m: float = 2.5
     min_height_m: float = 0.25
     max_height_m: float = 4.5
@@ -53,6 +55,7 @@ class MotionSettings:
     max_cost: float = 0.5
     min_through: float = 0.15
     sure_margin: float = 0.5
+    box_growth: float = 1.5
 
     def __post_init__(self) -> None:
         if self.window < 2:
@@ -64,11 +67,17 @@ class MotionSettings:
 
 
 CONSERVATIVE = MotionSettings(
-    margin=0.4, max_cost=0.4, min_through=0.25, min_points=15, sure_margin=9.0
+    margin=0.4, max_cost=0.4, min_through=0.25, min_points=15, sure_margin=9.0, box_growth=1.0
 )
 BALANCED = MotionSettings()
 AGGRESSIVE = MotionSettings(
-    margin=0.2, max_cost=0.6, min_through=0.05, min_points=5, seeds=2, sure_margin=0.0
+    margin=0.2,
+    max_cost=0.6,
+    min_through=0.05,
+    min_points=5,
+    seeds=2,
+    sure_margin=0.0,
+    box_growth=3.0,
 )
 PRESETS = {"conservative": CONSERVATIVE, "balanced": BALANCED, "aggressive": AGGRESSIVE}
 """From what is called moving surely is, to what moves is surely called so."""

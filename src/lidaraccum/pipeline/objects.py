@@ -26,6 +26,9 @@ THROUGH_COST = 1.5
 """A point without a partner costs less than one at the gate's edge where it may be hidden, and
 more where the frame saw through its place."""
 
+EXPECTED_M = 1.5
+"""A suspect this near to where a mover must be by now may be it."""
+
 JOIN_M = 0.4
 WHOLE_SHARE = 0.5
 WHOLE_GROWTH = 2.5
@@ -53,6 +56,25 @@ class Verdict:
 
     cost: NDArray[np.float64]
     through: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Expectation:
+    """A mover of earlier windows.
+
+    Attributes:
+        centre: (3,) metres, world, at ``stamp``.
+        velocity: (3,) m/s, world.
+        stamp: Seconds.
+    """
+
+    centre: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    stamp: float
+
+    def centre_at(self, stamp: float) -> NDArray[np.float64]:
+        """Where (3,) its centre must be at another time."""
+        return self.centre + self.velocity * (stamp - self.stamp)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,15 +171,30 @@ def refine_velocity(
     return refined
 
 
-def find_objects(frames: Sequence[SightedFrame], settings: MotionSettings) -> list[WindowObject]:
-    """The movers of a window whose frames have watched one another."""
+def find_objects(
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+    expected: Sequence[Expectation] = (),
+) -> list[WindowObject]:
+    """The movers of a window whose frames have watched one another.
+
+    Args:
+        frames: In order.
+        settings: What counts as a mover.
+        expected: Movers of earlier windows: their motions are tried first, and nothing else is
+            where they explain the points.
+    """
     suspects = find_suspects(frames, settings)
     taken = {frame.index: np.zeros(len(frame.rows), dtype=np.bool_) for frame in frames}
     objects: list[WindowObject] = []
     for suspect in suspects:
         if taken[frames[suspect.frame].index][suspect.picked].mean() > 0.3:
             continue
-        found = explain(suspect, suspects, frames, settings)
+        known = _expected_velocities(suspect, frames[suspect.frame].stamp, expected)
+        found = explain(suspect, known, frames, settings) if len(known) else None
+        if found is None:
+            proposals = propose(suspect, suspects, frames, settings)
+            found = explain(suspect, proposals, frames, settings)
         if found is None:
             continue
         for index, picked in found.picked.items():
@@ -166,20 +203,37 @@ def find_objects(frames: Sequence[SightedFrame], settings: MotionSettings) -> li
     return join_parts(objects, frames)
 
 
+def _expected_velocities(
+    suspect: Suspect, stamp: float, expected: Sequence[Expectation]
+) -> NDArray[np.float64]:
+    """Velocities (H, 3) of those movers that the suspect may well be."""
+    return np.array(
+        [
+            mover.velocity
+            for mover in expected
+            if np.linalg.norm(mover.centre_at(stamp) - suspect.centre) < EXPECTED_M
+        ]
+    ).reshape(-1, 3)
+
+
 def explain(
     suspect: Suspect,
-    suspects: Sequence[Suspect],
+    proposals: NDArray[np.float64],
     frames: Sequence[SightedFrame],
     settings: MotionSettings,
 ) -> WindowObject | None:
-    """The suspect as a mover, or None when standing still explains its points as well."""
+    """The suspect as a mover, or None when standing still explains its points as well.
+
+    Args:
+        suspect: Points of one frame.
+        proposals: (H, 3) velocities worth trying, m/s, world.
+        frames: The window.
+        settings: What counts as a mover.
+    """
     own = frames[suspect.frame]
     still = np.zeros((1, 3))
     rough = make_template(own, suspect.picked, FIRST_LOOK_POINTS)
-    if judge(rough, still, frames, settings).cost[0] < settings.margin:
-        return None
-    proposals = propose(suspect, suspects, frames, settings)
-    if len(proposals) == 0:
+    if len(proposals) == 0 or judge(rough, still, frames, settings).cost[0] < settings.margin:
         return None
     order = np.argsort(judge(rough, proposals, frames, settings).cost, kind="stable")
     template = make_template(own, suspect.picked, TEMPLATE_POINTS)
@@ -239,12 +293,13 @@ def gather(
 
 
 def _points_at(frame: SightedFrame, places: NDArray[np.float64]) -> NDArray[np.int64]:
-    own = frame.tree.data[: len(frame.rows)]
+    x, y = frame.level
     low, high = places.min(axis=0) - JOIN_M, places.max(axis=0) + JOIN_M
-    about = np.flatnonzero(((own[:, :2] > low[:2]) & (own[:, :2] < high[:2])).all(axis=1))
+    about = np.flatnonzero((x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]))
     if len(about) == 0:
         return about
-    distance, _ = cKDTree(places).query(own[about], distance_upper_bound=JOIN_M)
+    own = frame.places(frame.points[about], frame.heights[about])
+    distance, _ = cKDTree(places).query(own, distance_upper_bound=JOIN_M)
     close = about[np.isfinite(distance)]
     sizes = frame.segment_sizes
     shares = np.bincount(frame.segments[close], minlength=len(sizes)) / sizes

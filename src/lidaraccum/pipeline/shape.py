@@ -30,6 +30,9 @@ PRIOR = np.array([0.1, 0.1, 0.1, 0.05])
 EFFECTIVE_POINTS = 60
 """More points than this make the fit no surer against the prediction: their errors are alike."""
 
+BOX_QUANTILE = 0.02
+BOX_MARGIN_M = 0.1
+
 MAX_SHIFT_M = 0.6
 MAX_TURN = 0.2
 
@@ -63,6 +66,12 @@ class ObjectShape:
         """Distance (N,) from points (N, 3) to the shape's nearest; inf beyond the reach."""
         distance, _ = self._tree.query(points, distance_upper_bound=reach_m)
         return distance
+
+    def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether points (N, 3) lie in the box (N,) bool about all but the outermost of it."""
+        low, high = np.quantile(self._points, (BOX_QUANTILE, 1 - BOX_QUANTILE), axis=0)
+        inside = (points > low - BOX_MARGIN_M) & (points < high + BOX_MARGIN_M)
+        return np.asarray(inside.all(axis=1))
 
     def add(self, points: NDArray[np.float64]) -> None:
         """Grow by points (N, 3); what is already there stays, so that the shape does not blur."""
