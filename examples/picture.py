@@ -11,10 +11,10 @@ from pathlib import Path
 
 import click
 import numpy as np
-from lidaraccum.io.clouds import Cloud, read_cloud
 from matplotlib import pyplot as plt
 
 from lidaraccum.data.accumulation import MOVING, STILL
+from lidaraccum.io.clouds import Cloud, read_cloud
 
 GREY, BLUE, ORANGE = (
     np.array([0.85, 0.9, 0.95]),
@@ -61,7 +61,7 @@ def main(
         cloud = read_cloud(path)
         middle = np.median(cloud.positions[:, :2], axis=0) if centre is None else np.array(centre)
         panel.imshow(from_above(cloud, middle, radius, pixels))
-        panel.set_title(path.name)
+        panel.set_title(path.stem.replace("_", " "))
         panel.axis("off")
     plt.tight_layout()
     plt.savefig(output, dpi=pixels / 7)
