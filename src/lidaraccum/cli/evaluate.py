@@ -140,8 +140,8 @@ def _settings(params: dict[str, Any]) -> EvaluationSettings:
     )
 
 
-def _drives(params: dict[str, Any]) -> tuple[Iterator[LabelledSequence], int]:
-    """The drives to score, opened one by one, and how many they are."""
+def _drives(params: dict[str, Any]) -> tuple[Iterable[LabelledSequence], int]:
+    """The drives to score and how many they are."""
     if bool(params["sequence"]) == bool(params["simulated"]):
         raise click.UsageError("give labelled sequences, or --simulated N")
     if params["simulated"]:
@@ -167,16 +167,17 @@ def _folders(path: Path) -> list[Path]:
     return inside if inside and not (path / "labels").exists() else [path]
 
 
-def _opened(folders: Iterable[Path], frames: str) -> Iterator[LabelledSequence]:
+def _opened(folders: Iterable[Path], frames: str) -> list[LabelledSequence]:
+    """All of them, so that what cannot be scored is said before any work; none is read yet."""
     from lidaraccum.errors import InputError
     from lidaraccum.io.sequences import open_sequence
     from lidaraccum.io.settings import InputSettings
 
-    for folder in folders:
-        sequence = open_sequence(str(folder), InputSettings(frames=frames))
+    opened = [open_sequence(str(folder), InputSettings(frames=frames)) for folder in folders]
+    for folder, sequence in zip(folders, opened, strict=True):
         if not sequence.has_labels:
             raise InputError(f"{folder} has no labels", hint="a labels folder beside its frames")
-        yield sequence
+    return list(opened)
 
 
 def _tell(report: EvaluationReport, params: dict[str, Any]) -> None:
