@@ -9,8 +9,9 @@ import pytest
 
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import BALANCED
-from lidaraccum.pipeline.objects import find_objects, judge, refine_velocity
+from lidaraccum.pipeline.objects import find_objects
 from lidaraccum.pipeline.suspects import Template, make_template
+from lidaraccum.pipeline.verdict import judge, refine_velocity
 
 CAR_VELOCITY = np.array([-8.0, 0.0, 0.0])
 

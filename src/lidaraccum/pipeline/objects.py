@@ -15,16 +15,11 @@ from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.hypotheses import propose
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.suspects import Suspect, Template, find_suspects, make_template
+from lidaraccum.pipeline.verdict import Verdict, judge, judge_points, refine_velocity
 
 TEMPLATE_POINTS = 80
 FIRST_LOOK_POINTS = 30
 REFINED_HYPOTHESES = 2
-REFINING_STEPS = 3
-
-HIDDEN_COST = 0.7
-THROUGH_COST = 1.5
-"""A point without a partner costs less than one at the gate's edge where it may be hidden, and
-more where the frame saw through its place."""
 
 EXPECTED_M = 1.5
 """A suspect this near to where a mover must be by now may be it."""
@@ -43,19 +38,6 @@ standing costs it so much less than moving."""
 SAME_GAP_M = 0.8
 SAME_SPEED_MPS = 0.8
 """Two movers nearer than this and with velocities as like as this are one."""
-
-
-@dataclass(frozen=True, eq=False)
-class Verdict:
-    """What the points say of H hypotheses, (H,) each, means over points and frames.
-
-    Attributes:
-        cost: Truncated distance to the nearest partner over the gate, see `MotionSettings`.
-        through: Share of points without partner in places that the frame saw through.
-    """
-
-    cost: NDArray[np.float64]
-    through: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,81 +76,6 @@ class WindowObject:
     centre: NDArray[np.float64]
     stamp: float
     margin: float
-
-
-def judge(
-    template: Template,
-    velocities: NDArray[np.float64],
-    frames: Sequence[SightedFrame],
-    settings: MotionSettings,
-) -> Verdict:
-    """Try velocities (H, 3), m/s, world, on a cluster, in all other frames of its window."""
-    cost, through = judge_points(template, velocities, frames, settings)
-    return Verdict(cost=cost.mean(axis=1), through=through.mean(axis=1))
-
-
-def judge_points(
-    template: Template,
-    velocities: NDArray[np.float64],
-    frames: Sequence[SightedFrame],
-    settings: MotionSettings,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """As `judge`, point by point: costs (H, P) and shares of frames that saw through (H, P)."""
-    hypotheses, count = len(velocities), len(template.world)
-    heights = np.tile(template.heights, hypotheses)
-    costs, passed = [], []
-    for frame in frames:
-        seconds = frame.stamp - template.stamp
-        if seconds == 0:
-            continue
-        moved = template.world[None] + velocities[:, None] * seconds
-        local = rigid.transform(frame.sensor_from_world, moved.reshape(-1, 3))
-        gate = settings.truncation_m
-        distance, _ = frame.tree.query(frame.places(local, heights), distance_upper_bound=gate)
-        through = np.isinf(distance)
-        through[through] = frame.view.look(local[through]).through
-        alone = np.where(through, THROUGH_COST, HIDDEN_COST)
-        cost = np.where(np.isinf(distance), alone, distance / gate)
-        costs.append(cost.reshape(hypotheses, count))
-        passed.append(through.reshape(hypotheses, count))
-    return np.mean(costs, axis=0), np.mean(passed, axis=0)
-
-
-def refine_velocity(
-    template: Template,
-    velocity: NDArray[np.float64],
-    frames: Sequence[SightedFrame],
-    settings: MotionSettings,
-) -> NDArray[np.float64]:
-    """The velocity (3,) that best takes a cluster onto all other frames together, from a start.
-
-    ICP with one unknown for the whole window: each frame asks for a shift, its points in number
-    and its distance in time are its weight.
-    """
-    refined = velocity.copy()
-    for _ in range(REFINING_STEPS):
-        asked, weight = np.zeros(3), 0.0
-        for frame in frames:
-            seconds = frame.stamp - template.stamp
-            if seconds == 0:
-                continue
-            local = rigid.transform(frame.sensor_from_world, template.world + refined * seconds)
-            distance, partner = frame.tree.query(
-                frame.places(local, template.heights),
-                distance_upper_bound=2 * settings.truncation_m,
-            )
-            hit = np.isfinite(distance)
-            if not hit.any():
-                continue
-            trust = 1 / (0.1 + distance[hit])
-            lag = (frame.near_points[partner[hit]] - local[hit]) * trust[:, None]
-            shift = frame.world_from_sensor[:3, :3] @ (lag.sum(axis=0) / trust.sum())
-            asked += hit.sum() * seconds * shift
-            weight += hit.sum() * seconds**2
-        if weight == 0:
-            break
-        refined[:2] += asked[:2] / weight
-    return refined
 
 
 def find_objects(
