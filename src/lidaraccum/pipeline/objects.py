@@ -20,6 +20,8 @@ from lidaraccum.pipeline.verdict import Verdict, judge, judge_points, refine_vel
 TEMPLATE_POINTS = 80
 FIRST_LOOK_POINTS = 30
 REFINED_HYPOTHESES = 2
+PROBES = 5
+"""So many of a longer window's frames, evenly over it, are asked for their verdict."""
 
 EXPECTED_M = 1.5
 """A suspect this near to where a mover must be by now may be it."""
@@ -139,17 +141,18 @@ def explain(
     """
     own = frames[suspect.frame]
     still = np.zeros((1, 3))
+    probes = frames[:: max(1, (len(frames) - 1) // (PROBES - 1))]
     rough = make_template(own, suspect.picked, FIRST_LOOK_POINTS)
-    if len(proposals) == 0 or judge(rough, still, frames, settings).cost[0] < settings.margin:
+    if len(proposals) == 0 or judge(rough, still, probes, settings).cost[0] < settings.margin:
         return None
-    order = np.argsort(judge(rough, proposals, frames, settings).cost, kind="stable")
+    order = np.argsort(judge(rough, proposals, probes, settings).cost, kind="stable")
     template = make_template(own, suspect.picked, TEMPLATE_POINTS)
     refined = [
-        refine_velocity(rough, proposals[choice], frames, settings)
+        refine_velocity(rough, proposals[choice], probes, settings)
         for choice in order[:REFINED_HYPOTHESES]
     ]
     rivals = np.concatenate([still, refined])
-    verdict = judge(template, rivals, frames, settings)
+    verdict = judge(template, rivals, probes, settings)
     best = int(verdict.cost.argmin())
     if not _is_motion(best, rivals, verdict, frames, settings):
         return None
