@@ -53,7 +53,7 @@ def test_the_report_is_written_and_json_goes_to_stdout(
 def test_all_methods_can_be_asked_for_at_once(run: Any, drives: Path) -> None:
     from lidaraccum.evaluation.baselines import METHODS
 
-    result = run("evaluate", drives / "000007", "--window", 3, "--method", "all")
+    result = run("evaluate", drives / "000007", "--window", 2, "--method", "all")
     assert result.exit_code == 0, result.stderr
     for method in METHODS:
         assert f"| {method.name} |" in result.stdout
