@@ -1,0 +1,167 @@
+"""The frame's own ground: which way is up, and how high each point stands above the road.
+
+Quick and rough on purpose: the network's only use of height, for any mount, slope or origin. The
+first step finds the plane the vehicle stands on and levels the frame by it; the second follows the
+ground away from that plane, cell by cell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from lidaraccum.geometry.rigid import Pose, transform
+
+REACH_M = 64.0
+"""Half width of the ground map; points further out take the height at its edge."""
+CELL_M = 2.0
+PLANE_REACH_M = 25.0
+"""The plane is that of the ground this near; further out roads bend."""
+PLANE_INLIER_M = 0.15
+STEEPEST_MOUNT = 0.5
+"""Planes steeper than this (rise over run) are walls, whatever they score."""
+SLOPE = 0.2
+"""Ground rises and falls by at most this against the plane (rise over run)."""
+STRAY_M = 0.7
+"""A cell this far below all that is around it holds a stray echo, not ground."""
+
+_CELLS = int(2 * REACH_M / CELL_M)
+_TRIALS = 200
+_CONE_CELLS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """The ground under one frame.
+
+    Attributes:
+        level_from_sensor: (4, 4): turns the ground's normal upright and puts z = 0 on its plane;
+            x and y keep their origin, and their directions but for the tilt.
+        heights: (G, G) float64, metres: z of the ground in level coordinates at cell centres, x by
+            row, y by column.
+    """
+
+    level_from_sensor: Pose
+    heights: NDArray[np.float64]
+
+    def height_above(self, level_points: NDArray[Any]) -> NDArray[np.float64]:
+        """Height (N,) above the ground of points (N, 3), metres, in level coordinates."""
+        cells = np.clip((level_points[:, :2] + REACH_M) / CELL_M - 0.5, 0.0, _CELLS - 1.001)
+        low = cells.astype(np.int64)
+        part = cells - low
+        flat = low[:, 0] * _CELLS + low[:, 1]
+        table = self.heights.ravel()
+        near = table[flat] * (1 - part[:, 1]) + table[flat + 1] * part[:, 1]
+        far = table[flat + _CELLS] * (1 - part[:, 1]) + table[flat + _CELLS + 1] * part[:, 1]
+        return level_points[:, 2] - (near * (1 - part[:, 0]) + far * part[:, 0])
+
+
+def estimate_ground(points: NDArray[Any]) -> Ground:
+    """Ground of the points (N, 3) of one frame, metres, sensor coordinates, z roughly up.
+
+    Works without any ground in sight too (then level is the sensor's own level, at the height of
+    the lowest points), and does not depend on the order of the points.
+    """
+    plane = _fit_plane(_lowest(points[:, :2], points[:, 2]))
+    level_from_sensor = _levelling(plane)
+    level = transform(level_from_sensor, points)
+    return Ground(level_from_sensor, _follow(_lowest(level[:, :2], level[:, 2])))
+
+
+def _lowest(xy: NDArray[Any], z: NDArray[Any]) -> NDArray[np.float64]:
+    """Lowest z (G, G) in each cell; NaN where there is no point."""
+    cells = np.floor((xy + REACH_M) / CELL_M).astype(np.int64)
+    inside = np.flatnonzero(((cells >= 0) & (cells < _CELLS)).all(axis=1))
+    key = cells[inside, 0] * _CELLS + cells[inside, 1]
+    low = np.full(_CELLS * _CELLS, np.inf)
+    np.minimum.at(low, key, z[inside].astype(np.float64))
+    low[~np.isfinite(low)] = np.nan
+    return _without_strays(low.reshape(_CELLS, _CELLS))
+
+
+def _without_strays(low: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cells far below every cell around them blanked."""
+    around = np.ones((5, 5), dtype=bool)
+    around[2, 2] = False
+    beside = ndimage.minimum_filter(
+        np.where(np.isnan(low), np.inf, low), footprint=around, mode="nearest"
+    )
+    return np.asarray(np.where(low < beside - STRAY_M, np.nan, low), dtype=np.float64)
+
+
+def _centres() -> NDArray[np.float64]:
+    return (np.arange(_CELLS, dtype=np.float64) + 0.5) * CELL_M - REACH_M
+
+
+def _fit_plane(low: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(a, b, c) of z = a x + b y + c, through as many cells' lowest points as can be."""
+    x, y = np.meshgrid(_centres(), _centres(), indexing="ij")
+    near = (np.hypot(x, y) < PLANE_REACH_M) & ~np.isnan(low)
+    if np.count_nonzero(near) < 6:
+        floor = np.nanmin(low) if not np.isnan(low).all() else 0.0
+        return np.array([0.0, 0.0, float(floor)])
+    rows = np.stack([x[near], y[near], np.ones(np.count_nonzero(near))], axis=1)
+    z = low[near]
+    plane = _vote(rows, z)
+    for _ in range(3):
+        kept = np.abs(rows @ plane - z) < PLANE_INLIER_M
+        if np.count_nonzero(kept) < 6:
+            break
+        plane = np.asarray(np.linalg.lstsq(rows[kept], z[kept], rcond=None)[0], dtype=np.float64)
+    return plane
+
+
+def _vote(rows: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The best of many planes through three cells: many on it, few below it."""
+    rng = np.random.default_rng(0)
+    picks = rng.integers(0, len(z), (_TRIALS, 3))
+    systems, sides = rows[picks], z[picks]
+    sound = np.abs(np.linalg.det(systems)) > 10.0
+    flat = np.array([[0.0, 0.0, float(np.median(z))]])
+    planes = np.concatenate(
+        [flat, np.linalg.solve(systems[sound], sides[sound][..., None])[..., 0]]
+    )
+    planes = planes[np.hypot(planes[:, 0], planes[:, 1]) < STEEPEST_MOUNT]
+    above = z - planes @ rows.T
+    on_it = np.count_nonzero(np.abs(above) < PLANE_INLIER_M, axis=1)
+    below_it = np.count_nonzero(above < -3 * PLANE_INLIER_M, axis=1)
+    return planes[int(np.argmax(on_it - 2 * below_it))]
+
+
+def _levelling(plane: NDArray[np.float64]) -> Pose:
+    """The smallest turn that makes the plane's normal upright, and the drop to z = 0."""
+    normal = np.array([-plane[0], -plane[1], 1.0])
+    length = float(np.linalg.norm(normal))
+    normal /= length
+    axis = np.array([normal[1], -normal[0], 0.0])
+    cross = np.array([[0, 0, axis[1]], [0, 0, -axis[0]], [-axis[1], axis[0], 0]])
+    level_from_sensor = np.eye(4)
+    level_from_sensor[:3, :3] += cross + cross @ cross / (1.0 + normal[2])
+    level_from_sensor[2, 3] = -plane[2] / length
+    return level_from_sensor
+
+
+def _follow(low: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Ground (G, G) under the lowest points (G, G): as high as slope allows below them.
+
+    Buildings and bushes that hide the ground stick out of it; cells without points are bridged.
+    """
+    reach = np.arange(-_CONE_CELLS, _CONE_CELLS + 1) * CELL_M
+    cone = SLOPE * np.hypot(*np.meshgrid(reach, reach, indexing="ij"))
+    known = ~np.isnan(low)
+    if not known.any():
+        return np.zeros((_CELLS, _CELLS))
+    ground = np.where(known, low, 1e3)
+    for _ in range(2):
+        ground = ndimage.grey_erosion(ground, structure=-cone, mode="nearest")
+    bridged = ground < 100.0
+    if not bridged.all():
+        nearest = ndimage.distance_transform_edt(
+            ~bridged, return_distances=False, return_indices=True
+        )
+        ground = ground[tuple(nearest)]
+    return ndimage.uniform_filter(ground, size=3, mode="nearest")

@@ -1,0 +1,1 @@
+"""The network: modules and tensors only. Entry: `network.Network`; `batch` is the door."""

@@ -1,0 +1,277 @@
+"""The network's four verbs: encode a frame, match two, perceive a window, track its objects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import torch
+from torch import nn
+
+from lidaraccum.model.batch import FrameTensors
+from lidaraccum.model.ego_motion import EgoHead, EgoMatch, EgoPillars, Matcher, choose_background
+from lidaraccum.model.kabsch import about, chain, invert, move
+from lidaraccum.model.motion import MotionMap, PointHead, Windows, read
+from lidaraccum.model.pillars import PillarEncoder
+from lidaraccum.model.settings import NetworkSettings
+from lidaraccum.model.tube import TubeMotions, TubeNet, Tubes, gather_tubes
+from lidaraccum.model.unet import UNet, channels_last, convolution
+
+FOREGROUND_GATE = -1.0
+"""Points are looked at closely when their pillar's foreground logit is above this (0.27): the
+second look takes back what is not, but cannot bring in what the first passed over."""
+
+RARE = -2.0
+"""Logit that foreground starts from: most pillars hold none."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameFeatures:
+    """What the network says of F frames, each by itself; kept by a stream frame by frame.
+
+    Attributes:
+        frames: The frames' points and pillars.
+        base: (F, C, S, S) base features, level coordinates, x by row and y by column.
+        foreground: (V,) float32 logits of the occupied pillars: on something that can move.
+        ego: The background pillars that speak for each frame.
+    """
+
+    frames: FrameTensors
+    base: torch.Tensor
+    foreground: torch.Tensor
+    ego: EgoPillars
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    def select(self, index: int) -> FrameFeatures:
+        """One of the frames alone."""
+        first = sum(self.frames.pillar_counts[:index])
+        own = slice(first, first + self.frames.pillar_counts[index])
+        return FrameFeatures(
+            self.frames.select(index),
+            self.base[index : index + 1],
+            self.foreground[own],
+            self.ego.pick(torch.tensor([index], device=self.base.device)),
+        )
+
+    @staticmethod
+    def stack(parts: Sequence[FrameFeatures]) -> FrameFeatures:
+        """Several put one after another; their grids must be the same."""
+        return FrameFeatures(
+            FrameTensors.stack([part.frames for part in parts]),
+            torch.cat([part.base for part in parts]),
+            torch.cat([part.foreground for part in parts]),
+            EgoPillars.stack([part.ego for part in parts]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Perception:
+    """What the network says of the Q points it looked at closely, in W windows of known poses.
+
+    All other points are background.
+
+    Attributes:
+        windows: Which frames make which window.
+        point: (Q,) int64 index into the frames' points.
+        frame: (Q,) int64 index of the point's frame.
+        position: (Q, 3) metres, ego-aligned: level coordinates of the window's target.
+        foreground: (Q,) logit: on something that can move.
+        dynamic: (Q,) logit: on something that does move.
+        offset: (Q, 2) metres, x and y from the position to its object's centre in the target
+            frame, level axes.
+        feature: (Q, D) motion features.
+        base: (Q, C) base features of the point's own frame.
+        seconds: (Q,) of the point's frame from the target.
+    """
+
+    windows: Windows
+    point: torch.Tensor
+    frame: torch.Tensor
+    position: torch.Tensor
+    foreground: torch.Tensor
+    dynamic: torch.Tensor
+    offset: torch.Tensor
+    feature: torch.Tensor
+    base: torch.Tensor
+    seconds: torch.Tensor
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectMotions:
+    """Proposed motions of K objects.
+
+    Attributes:
+        ids: (K,) int64: the caller's, ascending.
+        window: (K,) int64 window each is in.
+        tubes: Their points.
+        motions: What TubeNet regressed, about the objects' anchors.
+        target_from_aligned: (K, T, 4, 4): from the object's ego-aligned place at each time of its
+            window to its place at the anchor's time; level coordinates of the target. The
+            identity at the anchor's own time and where the object is not seen.
+    """
+
+    ids: torch.Tensor
+    window: torch.Tensor
+    tubes: Tubes
+    motions: TubeMotions
+    target_from_aligned: torch.Tensor
+
+
+class Network(nn.Module):
+    """The parts, and the four verbs over them. No poses, labels or decisions of its own."""
+
+    def __init__(self, settings: NetworkSettings | None = None) -> None:
+        super().__init__()
+        settings = settings or NetworkSettings()
+        self.settings = settings
+        width = settings.base_widths[0]
+        self.pillars = PillarEncoder(settings)
+        self.backbone = UNet(width, settings.base_widths)
+        scores = nn.Conv2d(width, 1, 3, padding=1)
+        self.foreground_head = nn.Sequential(convolution(width, width), nn.ReLU(), scores)
+        nn.init.constant_(cast("torch.Tensor", scores.bias), RARE)
+        self.ego_head = EgoHead(settings)
+        self.matcher = Matcher(settings)
+        self.motion_map = MotionMap(settings)
+        self.point_head = PointHead(settings)
+        self.tube_net = TubeNet(settings)
+
+    def encode(self, frames: FrameTensors, choice: int = 0) -> FrameFeatures:
+        """Features of F frames, each by itself.
+
+        Args:
+            frames: From `batch.to_tensors`.
+            choice: Another number draws other background pillars (training).
+        """
+        base = self.backbone(self.pillars(frames))
+        scores = self.foreground_head(base).float()[:, 0].reshape(-1)
+        area = frames.cells * frames.cells
+        foreground = scores.index_select(0, frames.pillar_frame * area + frames.pillar_cell)
+        index, valid = choose_background(
+            frames, foreground.detach(), self.settings.ego_pillars, choice
+        )
+        owner = torch.arange(len(frames), device=index.device)[:, None].expand_as(index)
+        cell = frames.pillar_cell[index]
+        feature = self.ego_head(base, owner.reshape(-1), cell.reshape(-1)).view(*index.shape, -1)
+        ego = EgoPillars(frames.pillar_mean[index], feature, valid, frames.level_from_sensor)
+        return FrameFeatures(frames, base, foreground, ego)
+
+    def match(self, source: FrameFeatures, target: FrameFeatures, gap_s: torch.Tensor) -> EgoMatch:
+        """Proposed poses target_from_source of B pairs of frames, ``gap_s`` (B,) seconds apart."""
+        return self.matcher(source.ego, target.ego, gap_s)
+
+    def match_windows(self, features: FrameFeatures, windows: Windows) -> EgoMatch:
+        """Each source frame straight to its window's target, in the frames' order.
+
+        The targets themselves are left out: B is the number of frames less that of windows.
+        """
+        device = features.base.device
+        pairs = [(i, t) for i, t in enumerate(windows.target_of_frame) if i != t]
+        source, target = torch.tensor(pairs, device=device).reshape(-1, 2).T
+        stamps = features.frames.stamps
+        gaps = torch.tensor([stamps[i] - stamps[t] for i, t in pairs], device=device)
+        return self.matcher(features.ego.pick(source), features.ego.pick(target), gaps.float())
+
+    def perceive(
+        self,
+        features: FrameFeatures,
+        target_from_frame: torch.Tensor,
+        windows: Windows,
+        points: torch.Tensor | None = None,
+        *,
+        detach: bool = False,
+    ) -> Perception:
+        """Motion and offsets of the points in foreground pillars.
+
+        Args:
+            features: Of all frames of all windows, window by window, in order of time.
+            target_from_frame: (F, 4, 4) poses, sensor coordinates: the caller's.
+            windows: Which frames make which window.
+            points: (Q,) int64 the points to look at; `close_points` when None.
+            detach: Keep the motion branch's gradient out of the base features.
+        """
+        frames = features.frames
+        device = features.base.device
+        base = features.base.detach() if detach else features.base
+        owner = torch.tensor(windows.target_of_frame, device=device)
+        level = chain(
+            frames.level_from_sensor[owner],
+            target_from_frame.to(device, torch.float32),
+            invert(frames.level_from_sensor),
+        )
+        half = frames.half_extent_m
+        motion_map = self.motion_map(base, level, windows, frames.stamps, half)
+        point = close_points(features) if points is None else points
+        frame = frames.point_frame[point]
+        xyz = frames.points[point]
+        position = move(level[frame], xyz[:, None])[:, 0]
+        window = torch.tensor(windows.of_frame, device=device)[frame]
+        seconds = torch.tensor(windows.gaps(frames.stamps), device=device).float()[frame]
+        own_base = read(base, frame, xyz[:, :2], half)
+        motion = read(motion_map, window, position[:, :2], half)
+        centre = frames.pillar_centres()[frames.pillar[point]]
+        place = torch.cat(
+            [
+                (xyz[:, :2] - centre) / frames.pillar_m,
+                frames.height[point, None],
+                seconds[:, None],
+            ],
+            dim=1,
+        )
+        feature, foreground, dynamic, offset = self.point_head(motion, own_base, place)
+        return Perception(
+            windows, point, frame, position, foreground, dynamic, offset,
+            feature, own_base, seconds,
+        )  # fmt: skip
+
+    def track(self, perception: Perception, instance: torch.Tensor) -> ObjectMotions:
+        """Proposed motions of objects whose points the caller knows.
+
+        Args:
+            perception: Of the windows.
+            instance: (Q,) int64 ids, 0 for none; an id belongs to one window only.
+        """
+        chosen = torch.nonzero(instance > 0)[:, 0]
+        ids, row = torch.unique(instance[chosen], return_inverse=True)
+        device = instance.device
+        lengths = perception.windows.lengths
+        firsts = [sum(lengths[:window]) for window in range(len(lengths))]
+        first = torch.tensor(firsts, device=device)
+        target = torch.tensor(perception.windows.target, device=device) - first
+        of_frame = torch.tensor(perception.windows.of_frame, device=device)
+        frame = perception.frame[chosen]
+        window = torch.zeros_like(ids).index_copy(0, row, of_frame[frame])
+        tubes = gather_tubes(
+            perception.position[chosen],
+            row,
+            frame - first[of_frame[frame]],
+            perception.seconds[chosen],
+            target[window],
+            len(ids),
+        )
+        motions = self.tube_net(tubes, perception.feature[chosen], perception.base[chosen])
+        return ObjectMotions(
+            ids=ids,
+            window=window,
+            tubes=tubes,
+            motions=motions,
+            target_from_aligned=about(motions.anchor_from_time[-1], -tubes.anchor[:, None]),
+        )
+
+
+def close_points(features: FrameFeatures) -> torch.Tensor:
+    """The points (Q,) int64, ascending, whose pillars pass the gate: worth a closer look."""
+    passed = features.foreground.detach() > FOREGROUND_GATE
+    return torch.nonzero(passed[features.frames.pillar])[:, 0]
+
+
+def build_network(settings: NetworkSettings | None = None, seed: int = 0) -> Network:
+    """A network of these settings with fresh weights that depend on the seed alone."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        network = Network(settings)
+    channels_last(network)
+    return network

@@ -1,0 +1,57 @@
+"""Points to pillars to a bird's-eye map: a point-wise MLP and a maximum over each pillar."""
+
+from __future__ import annotations
+
+import torch
+from torch import nn
+
+from lidaraccum.model.batch import FrameTensors
+from lidaraccum.model.settings import NetworkSettings
+
+_POINT_FEATURES = 6
+_HEIGHT_SCALE_M = 2.0
+
+
+class PillarEncoder(nn.Module):
+    """A map (F, C, S, S) of each frame, zero where there is no point; x by row, y by column.
+
+    A point is told by where it lies in its pillar and how high above the frame's own ground:
+    neither absolute x and y nor intensity, which are traits of a sensor, not of a scene.
+    """
+
+    def __init__(self, settings: NetworkSettings) -> None:
+        super().__init__()
+        self.inner = nn.Linear(_POINT_FEATURES, settings.point_hidden)
+        self.outer = nn.Linear(settings.point_hidden, settings.pillar_channels)
+        self.project = nn.Linear(settings.pillar_channels, settings.base_widths[0])
+
+    def forward(self, frames: FrameTensors) -> torch.Tensor:
+        """Encode F frames."""
+        hidden = torch.relu(self.inner(_point_features(frames)))
+        hidden = torch.relu(self.outer(hidden))  # (P, C')
+        tallest = hidden.new_zeros(len(frames.pillar_cell), hidden.shape[1])
+        slots = frames.pillar[:, None].expand_as(hidden)
+        pillars = self.project(tallest.scatter_reduce(0, slots, hidden, "amax"))  # (V, C)
+        area = frames.cells * frames.cells
+        canvas = pillars.new_zeros(len(frames) * area, pillars.shape[1])
+        canvas = canvas.index_copy(0, frames.pillar_frame * area + frames.pillar_cell, pillars)
+        rows = canvas.view(len(frames), frames.cells, frames.cells, -1)
+        return rows.permute(0, 3, 1, 2)  # (F, C, S, S), channels last in memory
+
+
+def _point_features(frames: FrameTensors) -> torch.Tensor:
+    """(P, 6): place in the pillar, place against the pillar's mean, height above ground."""
+    home = torch.cat(
+        [frames.pillar_centres(), frames.pillar_mean[:, :2], frames.pillar_height[:, None]], dim=1
+    ).index_select(0, frames.pillar)
+    xy = frames.points[:, :2]
+    height = frames.height[:, None]
+    return torch.cat(
+        [
+            (xy - home[:, 0:2]) / frames.pillar_m,
+            (xy - home[:, 2:4]) / frames.pillar_m,
+            (height - home[:, 4:5]) / _HEIGHT_SCALE_M,
+            height / _HEIGHT_SCALE_M,
+        ],
+        dim=1,
+    )

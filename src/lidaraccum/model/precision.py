@@ -1,0 +1,38 @@
+"""Which arithmetic a device does fast: bfloat16 where it has units for it, else float32."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from functools import cache
+from pathlib import Path
+
+import torch
+
+_CPU_FLAGS = ("avx512_bf16", "amx_bf16")
+
+
+def inference(device: torch.device | str = "cpu") -> AbstractContextManager[object]:
+    """A context for the network's verbs on a device: bfloat16 where that is fast.
+
+    Motions, matches and losses stay in float32 inside it.
+    """
+    device = torch.device(device)
+    return torch.autocast(device.type, dtype=torch.bfloat16, enabled=has_bfloat16(device))
+
+
+def has_bfloat16(device: torch.device | str) -> bool:
+    """Whether the device multiplies bfloat16 faster than float32."""
+    device = torch.device(device)
+    if device.type == "cuda":
+        return torch.cuda.get_device_capability(device)[0] >= 8
+    return device.type == "cpu" and _cpu_has_bfloat16()
+
+
+@cache
+def _cpu_has_bfloat16() -> bool:
+    try:
+        described = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+    except OSError:  # not Linux: nothing says so
+        return False
+    flags = next((line for line in described.splitlines() if line.startswith("flags")), "")
+    return any(flag in flags.split() for flag in _CPU_FLAGS)

@@ -1,0 +1,78 @@
+"""The network's numbers, carried inside its checkpoint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lidaraccum.errors import SettingsError
+
+COARSEST_CELLS = 16
+"""Grid sides are multiples of this, so that every level of both U-Nets halves evenly."""
+
+
+@dataclass(frozen=True)
+class NetworkSettings:
+    """What shapes the network; its weights fit only the same settings.
+
+    Attributes:
+        pillar_m: Side of a pillar, metres.
+        extent_m: Side of the square grid about the sensor, metres, unless the caller asks for
+            another; the weights fit any.
+        lowest_m: Points lower than this above the ground are left out.
+        highest_m: Points higher than this above the ground are left out.
+        point_hidden: Channels between the two layers of the point-wise MLP.
+        pillar_channels: Channels of a pillar before its projection.
+        base_widths: Channels of the base U-Net by level, each half the size of the one before;
+            the first is that of the base features.
+        ego_channels: Channels of the ego features.
+        ego_pillars: Background pillars matched in each frame.
+        sinkhorn_rounds: Row and column normalisations.
+        fastest_mps: Nothing is matched to what it could only reach faster.
+        temporal_channels: Channels of the temporal block, at half the grid's resolution.
+        temporal_blocks: How many of them.
+        motion_widths: Channels of the motion U-Net by level, from half resolution on; the first
+            is that of the motion features.
+        point_channels: Channels of a point's motion features.
+        tube_channels: Channels of what TubeNet says of an object's positions in one frame.
+    """
+
+    pillar_m: float = 0.25
+    extent_m: float = 64.0
+    lowest_m: float = -2.0
+    highest_m: float = 6.0
+    point_hidden: int = 32
+    pillar_channels: int = 48
+    base_widths: tuple[int, ...] = (32, 64, 128, 192)
+    ego_channels: int = 64
+    ego_pillars: int = 1024
+    sinkhorn_rounds: int = 5
+    fastest_mps: float = 30.0
+    temporal_channels: int = 48
+    temporal_blocks: int = 2
+    motion_widths: tuple[int, ...] = (64, 96, 128)
+    point_channels: int = 128
+    tube_channels: int = 128
+
+    def __post_init__(self) -> None:
+        # A checkpoint's JSON brings lists.
+        object.__setattr__(self, "base_widths", tuple(self.base_widths))
+        object.__setattr__(self, "motion_widths", tuple(self.motion_widths))
+        if not 2 <= len(self.base_widths) <= 5 or not 2 <= len(self.motion_widths) <= 4:
+            raise SettingsError("a U-Net has 2 to 5 levels (base), 2 to 4 (motion)")
+        if self.lowest_m >= self.highest_m:
+            raise SettingsError("lowest_m must be below highest_m")
+        self.cells(self.extent_m)
+
+    def cells(self, extent_m: float) -> int:
+        """Cells along one side of a square grid of this extent, metres.
+
+        Raises:
+            SettingsError: The grid cannot be halved evenly down to the coarsest level.
+        """
+        cells = round(extent_m / self.pillar_m)
+        if cells <= 0 or cells % COARSEST_CELLS or abs(cells * self.pillar_m - extent_m) > 1e-6:
+            raise SettingsError(
+                f"the grid's extent must be a multiple of {COARSEST_CELLS * self.pillar_m:g} m, "
+                f"not {extent_m:g} m"
+            )
+        return cells

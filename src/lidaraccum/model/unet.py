@@ -1,0 +1,72 @@
+"""A small two-dimensional U-Net without normalisation: skips are added, not stacked."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import cast
+
+import torch
+from torch import nn
+
+
+def convolution(inputs: int, outputs: int, stride: int = 1) -> nn.Conv2d:
+    """A 3 x 3 convolution that keeps the size (or halves it), started for a ReLU after it."""
+    layer = nn.Conv2d(inputs, outputs, 3, stride=stride, padding=1)
+    nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
+    nn.init.constant_(cast("torch.Tensor", layer.bias), 0.0)
+    return layer
+
+
+def channels_last(module: nn.Module) -> None:
+    """Lay out all convolutions as processors like them; numbers stay the same."""
+    for parameter in module.parameters():
+        if parameter.dim() == 4:
+            parameter.data = parameter.data.contiguous(memory_format=torch.channels_last)
+
+
+class _Down(nn.Module):
+    def __init__(self, inputs: int, outputs: int) -> None:
+        super().__init__()
+        self.halve = convolution(inputs, outputs, stride=2)
+        self.refine = convolution(outputs, outputs)
+
+    def forward(self, fine: torch.Tensor) -> torch.Tensor:
+        coarse = torch.relu(self.halve(fine))
+        return torch.relu(self.refine(coarse) + coarse)
+
+
+class _Up(nn.Module):
+    def __init__(self, coarse: int, fine: int) -> None:
+        super().__init__()
+        self.narrow = nn.Conv2d(coarse, fine, 1)
+        self.refine = convolution(fine, fine)
+
+    def forward(self, coarse: torch.Tensor, skipped: torch.Tensor) -> torch.Tensor:
+        wide = nn.functional.interpolate(self.narrow(coarse), scale_factor=2.0, mode="nearest")
+        return self.refine(torch.relu(wide + skipped))
+
+
+class UNet(nn.Module):
+    """Maps (N, C, H, W) to (N, widths[0], H, W); H and W are multiples of 2^(levels - 1).
+
+    Source: the paper's supplement, figure "Network"; no normalisation as there, sums for stacks
+    and fewer channels for the sake of processors.
+    """
+
+    def __init__(self, inputs: int, widths: tuple[int, ...]) -> None:
+        super().__init__()
+        self.stem = convolution(inputs, widths[0])
+        pairs = list(pairwise(widths))
+        self.downs = nn.ModuleList(_Down(fine, coarse) for fine, coarse in pairs)
+        self.ups = nn.ModuleList(_Up(coarse, fine) for fine, coarse in reversed(pairs))
+
+    def forward(self, maps: torch.Tensor) -> torch.Tensor:
+        """Features at the resolution of the maps."""
+        level = torch.relu(self.stem(maps))
+        skipped: list[torch.Tensor] = []
+        for down in self.downs:
+            skipped.append(level)
+            level = down(level)
+        for up in self.ups:
+            level = up(level, skipped.pop())
+        return level

@@ -1,0 +1,1 @@
+"""Training: losses, windows from labelled sequences, the loop. Entry: `trainer.train`."""

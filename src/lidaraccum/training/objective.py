@@ -1,0 +1,245 @@
+"""The whole loss of a batch: the paper's equation 1 over the network's four verbs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Literal
+
+import torch
+
+from lidaraccum.errors import SettingsError
+from lidaraccum.model.kabsch import chain, compose, invert, move
+from lidaraccum.model.network import FrameFeatures, Network, ObjectMotions, Perception, close_points
+from lidaraccum.model.tube import rotation_of
+from lidaraccum.training.clusters import ClusterSettings, imperfect_clusters, truth_of_clusters
+from lidaraccum.training.losses import (
+    ego_loss,
+    object_loss,
+    object_weights,
+    offset_loss,
+    segmentation_loss,
+)
+from lidaraccum.training.window import Batch, Truth
+
+OFFSET_WEIGHT = 0.5
+OBJECT_WEIGHT = 0.3
+Poses = Literal["true", "noisy", "own"]
+
+
+@dataclass(frozen=True)
+class ObjectiveSettings:
+    """What the loss is made of.
+
+    Attributes:
+        poses: Which poses the motion branch is given: the true ones, true ones with noise (as a
+            verified pose still has), or those the network proposes.
+        noise_m: One sigma of the noise's shift.
+        noise_deg: One sigma of the noise's turn.
+        detach_motion: Keep the motion branch's gradient out of the base features.
+        most_points: Points looked at closely in one window; more are thinned by lot.
+        clusters: How wrong the objects are that TubeNet gets.
+    """
+
+    poses: Poses = "noisy"
+    noise_m: float = 0.03
+    noise_deg: float = 0.1
+    detach_motion: bool = False
+    most_points: int = 16384
+    clusters: ClusterSettings = field(default_factory=ClusterSettings)
+
+    def __post_init__(self) -> None:
+        if self.poses not in ("true", "noisy", "own"):
+            raise SettingsError(f"poses are true, noisy or own, not {self.poses!r}")
+
+
+@dataclass(frozen=True, eq=False)
+class Losses:
+    """The terms, unweighted scalars, and their weighted sum."""
+
+    total: torch.Tensor
+    ego: torch.Tensor
+    foreground: torch.Tensor
+    motion: torch.Tensor
+    offset: torch.Tensor
+    objects: torch.Tensor
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the terms, in order."""
+        return tuple(item.name for item in fields(self))
+
+    def numbers(self) -> list[float]:
+        """The terms as floats, in order, in one transfer."""
+        terms = [getattr(self, name) for name in self.names]
+        return torch.stack(terms).detach().cpu().tolist()
+
+
+def objective(
+    network: Network, batch: Batch, settings: ObjectiveSettings, generator: torch.Generator
+) -> Losses:
+    """The loss of one batch.
+
+    Args:
+        network: In training.
+        batch: Windows with their truth.
+        settings: What the loss is made of.
+        generator: On the CPU; draws pillars, noise, points and clusters.
+    """
+    truth = batch.truth
+    choice = int(torch.randint(1, 1 << 30, (1,), generator=generator))
+    features = network.encode(batch.frames, choice)
+    match = network.match_windows(features, batch.windows)
+    sources = source_index(batch).to(truth.known.device)
+    ego = ego_loss(match, truth.level_target_from_frame[sources])
+    poses = _given_poses(batch, match.target_from_source, settings, generator)
+    points = _points_to_teach(features, truth, settings.most_points, generator)
+    perception = network.perceive(
+        features, poses, batch.windows, points, detach=settings.detach_motion
+    )
+    foreground = pillar_loss(features, truth) + segmentation_loss(
+        perception.foreground, truth.foreground[points]
+    )
+    mine = truth.foreground[points]
+    motion = segmentation_loss(perception.dynamic[mine], truth.dynamic[points][mine])
+    aligned_from_object = object_poses(batch, poses)
+    offset = _offset_loss(perception, truth, aligned_from_object)
+    objects = _object_loss(network, perception, truth, aligned_from_object, settings, generator)
+    total = ego + foreground + motion + OFFSET_WEIGHT * offset + OBJECT_WEIGHT * objects
+    return Losses(total, ego, foreground, motion, offset, objects)
+
+
+def source_index(batch: Batch) -> torch.Tensor:
+    """(B,) int64 frames that are not their window's target, in order."""
+    targets = batch.windows.target_of_frame
+    return torch.tensor([i for i, target in enumerate(targets) if i != target])
+
+
+def pillar_loss(features: FrameFeatures, truth: Truth) -> torch.Tensor:
+    """Foreground loss of the pillars that hold an annotated point."""
+    slots = features.frames.pillar
+    empty = torch.zeros(len(features.foreground), device=slots.device)
+    told = empty.scatter_reduce(0, slots, truth.annotated.float(), "amax") > 0
+    label = empty.scatter_reduce(0, slots, truth.foreground.float(), "amax") > 0
+    return segmentation_loss(features.foreground[told], label[told])
+
+
+def _given_poses(
+    batch: Batch, own: torch.Tensor, settings: ObjectiveSettings, generator: torch.Generator
+) -> torch.Tensor:
+    """(F, 4, 4) target_from_frame for the motion branch; targets stay the identity."""
+    poses = batch.truth.target_from_frame
+    index = source_index(batch).to(poses.device)
+    if settings.poses == "own":
+        return poses.index_copy(0, index, own.detach())
+    if settings.poses == "noisy":
+        noise = torch.randn(len(index), 6, generator=generator).to(poses.device)
+        half_turn = torch.deg2rad(noise[:, 3:] * settings.noise_deg) / 2
+        quaternion = torch.cat([torch.ones_like(half_turn[:, :1]), half_turn], dim=1)
+        shaken = compose(rotation_of(quaternion), noise[:, :3] * settings.noise_m)
+        return poses.index_copy(0, index, chain(shaken, poses[index]))
+    return poses
+
+
+def _points_to_teach(
+    features: FrameFeatures, truth: Truth, most: int, generator: torch.Generator
+) -> torch.Tensor:
+    """Annotated points (Q,) that pass the gate or should have, thinned by lot where too many."""
+    wanted = torch.zeros_like(truth.foreground)
+    wanted[close_points(features)] = True
+    wanted = (wanted | truth.foreground) & truth.annotated
+    points = torch.nonzero(wanted)[:, 0]
+    if len(points) > most:
+        kept = torch.randperm(len(points), generator=generator)[:most].to(points.device)
+        points = points[torch.sort(kept)[0]]
+    return points
+
+
+def object_poses(batch: Batch, target_from_frame: torch.Tensor) -> torch.Tensor:
+    """(K, T, 4, 4): each object in ego-aligned coordinates, level, as the given poses align it."""
+    truth, frames = batch.truth, batch.frames
+    owner = torch.tensor(batch.windows.target_of_frame, device=target_from_frame.device)
+    level = chain(
+        frames.level_from_sensor[owner], target_from_frame, invert(frames.level_from_sensor)
+    )
+    span = truth.known.shape[1]
+    times = truth.first_frame[:, None] + torch.arange(span, device=level.device)
+    return chain(level[times.clamp_max(len(level) - 1)], truth.level_from_object)
+
+
+def true_motion(aligned_from_object: torch.Tensor, anchor_time: torch.Tensor) -> torch.Tensor:
+    """(K, T, 4, 4) from where an object is at each time to where it is at its anchor's time."""
+    rows = torch.arange(len(anchor_time), device=anchor_time.device)
+    return chain(aligned_from_object[rows, anchor_time][:, None], invert(aligned_from_object))
+
+
+def _offset_loss(
+    perception: Perception, truth: Truth, aligned_from_object: torch.Tensor
+) -> torch.Tensor:
+    target, has = offset_truth(perception, truth, aligned_from_object)
+    return offset_loss(perception.offset[has], target[has])
+
+
+def offset_truth(
+    perception: Perception, truth: Truth, aligned_from_object: torch.Tensor
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """True offsets (Q, 2) metres, and which points (Q,) have one.
+
+    An object's centre is the mean of its points of all frames, brought to its place in the target
+    frame; an object unknown there is brought to the nearest time at which it is known.
+    """
+    row = truth.object_row[perception.point]
+    count, span = truth.known.shape
+    time = perception.frame - truth.first_frame[row.clamp_min(0)] if count else perception.frame
+    if count == 0:
+        return torch.zeros_like(perception.offset), torch.zeros_like(row, dtype=torch.bool)
+    target = torch.tensor(perception.windows.target_of_frame, device=row.device)
+    target_time = target[truth.first_frame] - truth.first_frame
+    away = (torch.arange(span, device=row.device)[None] - target_time[:, None]).abs()
+    anchor = away.masked_fill(~truth.known, 10 * span).argmin(dim=1)
+    motion = true_motion(aligned_from_object, anchor)
+    has = row >= 0
+    has &= truth.known[row.clamp_min(0), time.clamp(0, span - 1)]
+    mine, when = row[has], time[has]
+    home = move(motion[mine, when], perception.position[has][:, None])[:, 0, :2]
+    points = torch.bincount(mine, minlength=count).clamp_min(1)
+    centre = home.new_zeros(count, 2).index_add(0, mine, home) / points[:, None]
+    offset = torch.zeros_like(perception.offset)
+    offset[has] = centre[mine] - perception.position[has][:, :2]
+    return offset, has
+
+
+def _object_loss(
+    network: Network,
+    perception: Perception,
+    truth: Truth,
+    aligned_from_object: torch.Tensor,
+    settings: ObjectiveSettings,
+    generator: torch.Generator,
+) -> torch.Tensor:
+    row = truth.object_row[perception.point]
+    window = torch.tensor(perception.windows.of_frame, device=row.device)[perception.frame]
+    cluster = imperfect_clusters(perception.position, row, window, settings.clusters, generator)
+    ids, owner = truth_of_clusters(cluster, row)
+    cluster = torch.where(torch.isin(cluster, ids[owner >= 0]), cluster, 0)
+    owner = owner[owner >= 0]
+    if len(owner) == 0:
+        return perception.feature.sum() * 0.0
+    objects = network.track(perception, cluster)
+    motion, weight = object_truth(objects, truth, aligned_from_object, owner)
+    return object_loss(objects, motion, weight)
+
+
+def object_truth(
+    objects: ObjectMotions, truth: Truth, aligned_from_object: torch.Tensor, owner: torch.Tensor
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """True target_from_aligned (K, T, 4, 4) and weights (K, T) of tracked objects.
+
+    ``owner`` (K,) is the row of the true object behind each.
+    """
+    span = objects.tubes.counts.shape[1]
+    anchor = objects.tubes.anchor_time
+    rows = torch.arange(len(anchor), device=anchor.device)
+    known = truth.known[owner][:, :span]
+    known = known & known[rows, anchor][:, None]
+    motion = true_motion(aligned_from_object[owner][:, :span], anchor)
+    return motion, object_weights(objects, truth.still[owner], known)

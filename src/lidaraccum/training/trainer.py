@@ -1,0 +1,224 @@
+"""The training loop: from nothing, or from where it was killed, to weights in a folder."""
+
+from __future__ import annotations
+
+import copy
+import logging
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import torch
+
+from lidaraccum.errors import OutputExistsError, SettingsError
+from lidaraccum.model.checkpoint import load_network
+from lidaraccum.model.network import build_network
+from lidaraccum.model.precision import inference
+from lidaraccum.training.dataset import SimulatedDrives, ValidationDrives, WindowSource
+from lidaraccum.training.journal import Journal
+from lidaraccum.training.loader import batches_from
+from lidaraccum.training.objective import Losses, objective
+from lidaraccum.training.scores import Scores, score_network
+from lidaraccum.training.settings import OptimiserSettings, TrainSettings
+from lidaraccum.training.state import (
+    METRICS_FILE,
+    STATE_FILE,
+    WEIGHTS_FILE,
+    RunState,
+    restore_state,
+    save_state,
+)
+from lidaraccum.training.window import Batch, TrainingWindow, make_batch
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class TrainReport:
+    """What a run came to.
+
+    Attributes:
+        steps: Steps done, all resumptions together.
+        seconds: Time spent, likewise.
+        weights: The file with the running mean of the weights.
+        scores: The last validation's, or None.
+    """
+
+    steps: int
+    seconds: float
+    weights: Path
+    scores: Scores | None
+
+
+def train(
+    settings: TrainSettings,
+    out_dir: Path,
+    *,
+    resume: bool = False,
+    source: WindowSource | None = None,
+    held_out: WindowSource | None = None,
+    on_step: Callable[[int, float], None] | None = None,
+) -> TrainReport:
+    """Train into a folder: ``weights.safetensors``, ``state.safetensors``, ``metrics.jsonl``.
+
+    Args:
+        settings: What is learned, from what, for how long.
+        out_dir: Made when it is not there.
+        resume: Go on from the folder's state, if it has one.
+        source: Where windows come from; simulated drives when None.
+        held_out: Windows to validate on; seeds that never train, nor test, when None.
+        on_step: Told the step and its loss after each.
+
+    Raises:
+        OutputExistsError: The folder holds a run and ``resume`` was not asked for.
+        SettingsError: The run to resume was started with other settings, or there is no such
+            device.
+    """
+    out_dir.mkdir(parents=True, exist_ok=True)
+    if (out_dir / STATE_FILE).exists() and not resume:
+        raise OutputExistsError(f"{out_dir} already holds a run", hint="resume it, or name another")
+    if settings.threads:
+        torch.set_num_threads(settings.threads)
+    run = _Run(settings, out_dir, source, held_out)
+    return run.go(on_step)
+
+
+class _Run:
+    """One life of a run, from its start or resumption to its end."""
+
+    def __init__(
+        self,
+        settings: TrainSettings,
+        out_dir: Path,
+        source: WindowSource | None,
+        held_out: WindowSource | None,
+    ) -> None:
+        self.settings = settings
+        self.out_dir = out_dir
+        self.device = _pick_device(settings.device)
+        self.state = _fresh_state(settings, self.device)
+        if (out_dir / STATE_FILE).exists():
+            restore_state(self.state, settings, out_dir)
+            _log.info("resumed at step %d", self.state.step)
+        network = self.state.network.settings
+        self.source = source or SimulatedDrives(network, settings.windows, settings.seed)
+        self.held_out = held_out or ValidationDrives(network, settings.windows.extent_m)
+        self.journal = Journal(out_dir / METRICS_FILE, self.state.step)
+        self.began = time.monotonic() - self.state.seconds
+        self.scores: Scores | None = None
+
+    def go(self, on_step: Callable[[int, float], None] | None) -> TrainReport:
+        """Train to the end of the budget; the state is on the disk when this returns."""
+        settings, state = self.settings, self.state
+        saved = time.monotonic()
+        recent: list[list[float]] = []
+        names: tuple[str, ...] = ()
+        batches = self._batches()
+        while not self._is_over():
+            losses = self._step(make_batch(next(batches), self.device))
+            recent.append(losses.numbers())
+            names = losses.names
+            if on_step:
+                on_step(state.step, recent[-1][0])
+            if state.step % settings.log_steps == 0 or self._is_over():
+                self._note_losses(names, recent)
+                recent = []
+            if settings.validate_steps and state.step % settings.validate_steps == 0:
+                self._validate()
+            if time.monotonic() - saved >= 60.0 * settings.checkpoint_minutes:
+                self._save()
+                saved = time.monotonic()
+        self._save()
+        return TrainReport(state.step, state.seconds, self.out_dir / WEIGHTS_FILE, self.scores)
+
+    def _batches(self) -> Iterator[list[TrainingWindow]]:
+        return batches_from(
+            self.source,
+            self.state.step,
+            self.settings.optimiser.batch,
+            self.settings.windows.windows_per_drive,
+            self.settings.workers,
+        )
+
+    def _is_over(self) -> bool:
+        steps, hours = self.settings.steps, self.settings.hours
+        if steps is not None and self.state.step >= steps:
+            return True
+        return hours is not None and time.monotonic() - self.began >= 3600.0 * hours
+
+    def _step(self, batch: Batch) -> Losses:
+        state, settings = self.state, self.settings
+        generator = torch.Generator().manual_seed(settings.seed * 1_000_003 + state.step)
+        for group in state.optimiser.param_groups:
+            group["lr"] = learning_rate(settings.optimiser, state.step, settings.steps)
+        state.optimiser.zero_grad(set_to_none=True)
+        with inference(self.device):
+            losses = objective(state.network, batch, settings.objective, generator)
+        losses.total.backward()  # type: ignore[no-untyped-call]
+        length = torch.nn.utils.clip_grad_norm_(state.network.parameters(), settings.optimiser.clip)
+        if torch.isfinite(length):
+            state.optimiser.step()
+        else:  # one window must not end a run of days
+            _log.warning("step %d: gradient is not finite, nothing learned", state.step)
+        state.step += 1
+        _follow(state.average, state.network, settings.optimiser.average, state.step)
+        return losses
+
+    def _note_losses(self, names: tuple[str, ...], recent: list[list[float]]) -> None:
+        means = [sum(column) / len(recent) for column in zip(*recent, strict=True)]
+        rate = learning_rate(self.settings.optimiser, self.state.step, self.settings.steps)
+        numbers = dict(zip(names, means, strict=True)) | {"rate": rate}
+        self.journal.note("loss", self.state.step, time.monotonic() - self.began, numbers)
+
+    def _validate(self) -> None:
+        self.scores = score_network(self.state.average, self._held_out_batches())
+        seconds = time.monotonic() - self.began
+        self.journal.note("score", self.state.step, seconds, asdict(self.scores))
+
+    def _held_out_batches(self) -> Iterator[Batch]:
+        for place in range(self.settings.validation_windows):
+            for window in self.held_out.windows(place):
+                yield make_batch([window], self.device)
+
+    def _save(self) -> None:
+        self.state.seconds = time.monotonic() - self.began
+        save_state(self.state, self.settings, self.out_dir)
+
+
+def _pick_device(name: str) -> torch.device:
+    if name == "cuda" and not torch.cuda.is_available():
+        raise SettingsError("there is no CUDA device here", hint="use cpu or auto")
+    if name == "auto":
+        name = "cuda" if torch.cuda.is_available() else "cpu"
+    return torch.device(name)
+
+
+def _fresh_state(settings: TrainSettings, device: torch.device) -> RunState:
+    if settings.start_from is None:
+        network = build_network(settings.network, settings.seed)
+    else:
+        network = load_network(settings.start_from)
+    network = network.to(device).train()
+    average = copy.deepcopy(network).eval().requires_grad_(False)
+    optimiser = torch.optim.Adam(network.parameters(), lr=settings.optimiser.rate)
+    return RunState(network, average, optimiser)
+
+
+def learning_rate(settings: OptimiserSettings, step: int, steps: int | None) -> float:
+    """Rate of step ``step`` (from 0) of ``steps``."""
+    rise = min(1.0, (step + 1) / settings.warmup_steps) if settings.warmup_steps else 1.0
+    if settings.schedule == "cosine" and steps:
+        fall = 0.505 + 0.495 * math.cos(math.pi * min(step / steps, 1.0))
+    else:
+        fall = settings.decay ** (step / settings.epoch_steps)
+    return settings.rate * rise * fall
+
+
+@torch.no_grad()
+def _follow(average: torch.nn.Module, network: torch.nn.Module, keep: float, step: int) -> None:
+    """Move the running mean; it forgets fast at first, so that early weights do not linger."""
+    keep = min(keep, (1.0 + step) / (10.0 + step))
+    for mean, value in zip(average.parameters(), network.parameters(), strict=True):
+        mean.lerp_(value, 1.0 - keep)

@@ -1,0 +1,36 @@
+"""Warping and reading of maps."""
+
+from __future__ import annotations
+
+import torch
+
+from lidaraccum.model.kabsch import invert
+from lidaraccum.model.motion import Windows, read, warp
+
+
+def ramp(size: int = 32) -> torch.Tensor:
+    """(1, 2, S, S): each cell holds its own centre's x and y; 0.25 m cells."""
+    centres = (torch.arange(size) + 0.5) * 0.25 - size * 0.125
+    x, y = torch.meshgrid(centres, centres, indexing="ij")
+    return torch.stack([x, y])[None]
+
+
+def test_a_reading_is_where_it_was_asked_for() -> None:
+    xy = torch.tensor([[0.3, -1.7], [2.01, 3.0], [-3.6, 0.0]])
+    torch.testing.assert_close(read(ramp(), torch.zeros(3).long(), xy, 4.0), xy)
+
+
+def test_warped_features_lie_where_the_pose_puts_them() -> None:
+    pose = torch.eye(4)
+    angle = torch.tensor(0.2)
+    pose[:2, :2] = torch.stack([torch.stack([angle.cos(), -angle.sin()]),
+                                torch.stack([angle.sin(), angle.cos()])])  # fmt: skip
+    pose[:2, 3] = torch.tensor([0.5, -0.3])
+    maps = torch.cat([ramp(), ramp()])
+    poses = torch.stack([torch.eye(4), pose])
+    warped = warp(maps, poses, Windows.single(2), 4.0)
+    assert torch.equal(warped[0], maps[0])
+    xy = torch.tensor([[0.4, 0.2], [-1.0, 1.5]])
+    there = read(warped, torch.ones(2).long(), xy, 4.0)
+    back = invert(pose)
+    torch.testing.assert_close(there, xy @ back[:2, :2].T + back[:2, 3], atol=1e-5, rtol=1e-5)
