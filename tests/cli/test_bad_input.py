@@ -132,3 +132,52 @@ def test_a_traceback_only_when_asked_for(run: Any, tmp_path: Path) -> None:
     result = run("accumulate", missing, "-o", tmp_path / "out.ply", "--traceback")
     assert result.exit_code == 3
     assert "Traceback" in result.stderr
+
+
+def test_an_output_never_replaces_an_input(run: Any, bins: Path, drive: Any) -> None:
+    frame = bins / "0.npz"
+    np.savez(frame, points=drive.frames[0])
+    np.savez(bins / "1.npz", points=drive.frames[1])
+    before = frame.read_bytes()
+    result = run("accumulate", bins, "-o", frame, "--format", "npz", "--overwrite")
+    assert result.exit_code == 2
+    assert "one of the input frames" in result.stderr
+    assert frame.read_bytes() == before
+
+
+@pytest.mark.parametrize("option", ["--voxel", "--min-range", "--max-range"])
+def test_numbers_must_be_finite(run: Any, bins: Path, tmp_path: Path, option: str) -> None:
+    assert "finite" in refused(run, tmp_path, bins, option, "nan", code=2)
+
+
+def test_a_setting_of_the_wrong_kind(run: Any, bins: Path, tmp_path: Path) -> None:
+    toml = tmp_path / "settings.toml"
+    toml.write_text("voxel = [1]\n")
+    result = run("accumulate", bins, "-o", tmp_path / "o.ply", "--config", toml)
+    assert result.exit_code == 2
+    assert "wrong kind" in result.stderr
+
+
+@pytest.mark.parametrize("count", [2, 10, 300])
+def test_too_few_points_to_trust_are_doubted_not_lost(
+    run: Any, drive: Any, tmp_path: Path, count: int
+) -> None:
+    folder = tmp_path / "seq"
+    folder.mkdir()
+    for index, points in enumerate(drive.frames):
+        np.save(folder / f"{index}.npy", points[::7][:count])
+    result = run("accumulate", folder, "-o", tmp_path / "out.npz", "--strict")
+    assert result.exit_code == 4, result.stderr
+    with np.load(tmp_path / "out.npz") as cloud:
+        assert len(cloud["points"]) == 6 * count
+
+
+def test_an_absurd_point_is_carried_and_harms_nothing(run: Any, drive: Any, tmp_path: Path) -> None:
+    folder = tmp_path / "seq"
+    folder.mkdir()
+    for index, points in enumerate(drive.frames):
+        np.save(folder / f"{index}.npy", np.vstack([points, np.float32([[3e38, 0, 0]])]))
+    result = run("accumulate", folder, "-o", tmp_path / "out.npz")
+    assert result.exit_code == 0, result.stderr
+    found = np.loadtxt(tmp_path / "out.poses.txt").reshape(-1, 3, 4)[:, :, 3]
+    np.testing.assert_allclose(found, drive.first_from_frame[:, :3, 3], atol=0.03)

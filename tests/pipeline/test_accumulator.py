@@ -109,7 +109,7 @@ def test_the_clean_map_has_no_mover(sequence: DriveWithMover) -> None:
 
 
 def test_every_point_comes_out_once_in_order(sequence: DriveWithMover) -> None:
-    result = accumulate(sequence)
+    result = accumulate(sequence, AccumulateSettings(method="ego-only"))
     counts = [len(sequence[index]) for index in range(6)]
     np.testing.assert_array_equal(result.frame, np.repeat(range(6), counts))
     assert set(np.unique(result.label)) == {0}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -71,6 +70,8 @@ def accumulate(**params: Any) -> None:
     if params["dry_run"]:
         _tell_plan(sequence, output)
         return
+    if not params["quiet"]:
+        _tell_found(sequence)
     quiet = params["quiet"] or params["no_progress"]
     shown = watch(len(sequence), quiet=quiet)
     report = accumulate_to_files(sequence, settings, output, watch=shown)
@@ -80,6 +81,17 @@ def accumulate(**params: Any) -> None:
             f"{len(report.doubtful)} of {report.frames} poses are doubtful",
             hint="the report names them",
         )
+
+
+def _tell_found(sequence: FileSequence) -> None:
+    info = sequence.info
+    beside = info.poses_file is not None and info.poses_used.startswith("none")
+    unused = f" ({info.poses_file} lies beside them; --poses auto uses it)" if beside else ""
+    click.echo(
+        f"{info.frames} frames of {info.source} ({info.layout}, {info.format}) at "
+        f"{info.rate_hz:g} Hz ({info.rate_from}); poses: {info.poses_used}{unused}",
+        err=True,
+    )
 
 
 def _tell_plan(sequence: FileSequence, output: OutputSettings) -> None:
@@ -95,7 +107,9 @@ def _tell_result(
     report: AccumulationReport, output: OutputSettings, *, as_json: bool, quiet: bool
 ) -> None:
     if as_json:
-        click.echo(json.dumps(asdict(report), indent=1))
+        from lidaraccum.io.atomic import json_text
+
+        click.echo(json_text(asdict(report)), nl=False)
     if quiet:
         return
     for warning in report.warnings:

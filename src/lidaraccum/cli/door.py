@@ -38,6 +38,13 @@ class Command(click.Command):
         kwargs["context_settings"] = settings | kwargs.get("context_settings", {})
         super().__init__(*args, **kwargs)
 
+    def make_context(self, *args: Any, **kwargs: Any) -> click.Context:
+        """Parse; a value of a kind that no option takes (a list in TOML, say) is a usage error."""
+        try:
+            return super().make_context(*args, **kwargs)
+        except TypeError as error:
+            raise click.UsageError(f"a setting is of the wrong kind: {error}") from error
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; turn what it raises into talk on stderr and an exit code."""
         _set_up_talk(ctx.params)

@@ -83,7 +83,13 @@ input_options = _stack(
         "--frames", metavar="A:B:C", help="Only these frames, as a slice: start:stop:step."
     ),
     click.option("--rate", type=float, metavar="HZ", help="Frames a second, where no stamps say."),
-    click.option("--format", "format_", metavar="SUFFIX", help="In a mixed folder: which files."),
+    click.option(
+        "--format",
+        "format_",
+        envvar="LIDARACCUM_FORMAT",
+        metavar="SUFFIX",
+        help="In a mixed folder: which files.",
+    ),
     click.option(
         "--bin-fields",
         metavar="NAMES",
@@ -149,7 +155,11 @@ result_options = _stack(
         "--max-range", type=float, default=0.0, metavar="M", help="Drop farther points; 0 for none."
     ),
     click.option(
-        "--drop-dynamic", "--static-only", is_flag=True, help="The clean map: drop what moves."
+        "--drop-dynamic",
+        "--static-only",
+        is_flag=True,
+        envvar=["LIDARACCUM_DROP_DYNAMIC", "LIDARACCUM_STATIC_ONLY"],
+        help="The clean map: drop what moves.",
     ),
 )
 
@@ -166,7 +176,13 @@ talk_options = _stack(
         callback=_load_config,
         help="Settings from a TOML file, keys named like the options.",
     ),
-    click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON."),
+    click.option(
+        "--json",
+        "as_json",
+        is_flag=True,
+        envvar="LIDARACCUM_JSON",
+        help="Print the summary as JSON.",
+    ),
     click.option("--no-progress", is_flag=True, help="No progress bar; none without a terminal."),
     click.option("-q", "--quiet", is_flag=True, help="Say only what went wrong."),
     click.option("-v", "--verbose", is_flag=True, help="Say what is being done."),

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from lidaraccum.errors import SettingsError
+
 if TYPE_CHECKING:
     from lidaraccum.io.sequences import FileSequence
     from lidaraccum.pipeline.accumulator import AccumulateSettings
@@ -38,6 +40,8 @@ def accumulate_settings(params: Mapping[str, Any]) -> AccumulateSettings:
     from lidaraccum.pipeline.selection import SelectionSettings
     from lidaraccum.registration.settings import RegistrationSettings
 
+    if params["poses_mode"] == "refine" and not params["poses"]:
+        raise SettingsError("--poses-mode refine needs --poses", hint="auto for those found")
     return AccumulateSettings(
         method=params["method"],
         preset=params["preset"],

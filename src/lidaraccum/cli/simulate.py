@@ -28,7 +28,13 @@ Job = tuple["DriveSettings", Path, str, bool]
     required=True,
     help="The sequence's folder; with --count the folder of them all.",
 )
-@click.option("--frames", type=click.IntRange(min=1), default=10, help="Frames a drive.")
+@click.option(
+    "--frames",
+    allow_from_autoenv=False,
+    type=click.IntRange(min=1),
+    default=10,
+    help="Frames a drive.",
+)
 @click.option(
     "--sensor", metavar="NAME", help="Such as HDL-64E or random; drawn by the seed without."
 )
@@ -48,6 +54,7 @@ Job = tuple["DriveSettings", Path, str, bool]
 @click.option(
     "--format",
     "format_",
+    envvar="LIDARACCUM_FORMAT",
     type=click.Choice(["laz", "ply", "bin"]),
     default="laz",
     help="Of the frames.",

@@ -81,6 +81,12 @@ class Frame:
         away = np.abs(self.points) >= NO_RETURN_RANGE_M
         return away[:, 0] | away[:, 1] | away[:, 2]
 
+    @property
+    def ranges(self) -> NDArray[np.float32]:
+        """(N,) distance from the sensor, metres; infinite where float32 cannot hold it."""
+        with np.errstate(over="ignore"):
+            return np.linalg.norm(self.points, axis=1)
+
     def with_points(self, points: FloatArray) -> Frame:
         """The same frame with its points elsewhere (deskewed, say): (N, 3), metres."""
         return replace(self, points=np.asarray(points, dtype=np.float32))

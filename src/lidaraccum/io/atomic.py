@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 from collections.abc import Iterator
@@ -89,6 +90,19 @@ def write_text(path: Path, text: str, *, overwrite: bool = False) -> None:
         temporary.write_text(text)
 
 
+def json_text(data: Any) -> str:
+    """Data as JSON; numbers that are not finite, which JSON does not know, as null."""
+    return json.dumps(_finite(data), indent=2, allow_nan=False) + "\n"
+
+
 def write_json(path: Path, data: Any, *, overwrite: bool = False) -> None:
-    """Write a JSON file, whole or not at all."""
-    write_text(path, json.dumps(data, indent=2, allow_nan=False) + "\n", overwrite=overwrite)
+    """Write a JSON file, whole or not at all; numbers that are not finite become null."""
+    write_text(path, json_text(data), overwrite=overwrite)
+
+
+def _finite(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, (list, tuple)):
+        return [_finite(value) for value in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data

@@ -75,7 +75,7 @@ class Schema:
         if values.dtype == kind:
             return values
         with np.errstate(invalid="ignore", over="ignore"):
-            cast = values.astype(kind)
+            cast = _within(values, kind).astype(kind)
         if values.dtype != np.float16 and not np.array_equal(
             cast, values, equal_nan=kind.kind == "f"
         ):
@@ -88,6 +88,15 @@ class Schema:
         if key not in self._said:
             self._said.add(key)
             logger.warning(sentence)
+
+
+def _within(values: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
+    """Values cut off at what an integer type holds, so that none wraps around."""
+    if kind.kind not in "iu":
+        return values
+    limits = np.iinfo(kind)
+    known = np.nan_to_num(values) if values.dtype.kind == "f" else values
+    return np.clip(known, limits.min, limits.max)
 
 
 def writable_type(kind: np.dtype[Any]) -> np.dtype[Any]:
@@ -111,5 +120,6 @@ def distinct_names(names: list[str]) -> dict[str, str]:
 
 
 def file_name_of(name: str) -> str:
-    """An attribute's name without blanks, which headers of words cannot hold."""
-    return "_".join(name.split()) or "unnamed"
+    """An attribute's name without what headers of plain words cannot hold: blanks, non-ASCII."""
+    word = "_".join(name.split()) or "unnamed"
+    return "".join(letter if letter.isascii() else f"u{ord(letter):04x}" for letter in word)

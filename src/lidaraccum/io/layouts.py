@@ -170,9 +170,23 @@ def labelled_layout(folder: Path) -> Layout:
         poses_file=first_file(folder, "poses.txt", "poses.tum"),
         labels=labels if has_labels else None,
         label_kind=NPZ_LABELS if has_labels else "",
-        bin_fields=tuple(str(name) for name in meta.get("bin_fields", ())),
+        bin_fields=stated_fields(folder / "meta.json", meta),
         boxes_file=first_file(folder, "boxes.json"),
     )
+
+
+def stated_fields(path: Path, meta: dict[str, Any]) -> tuple[str, ...]:
+    """Names of the fields of ``.bin`` frames that meta.json states, or none.
+
+    Raises:
+        InputError: It states something else.
+    """
+    names = meta.get("bin_fields", [])
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise InputError(f"bin_fields in {path} must be a list of names, not {names!r}")
+    if names and not {"x", "y", "z"} <= set(names):
+        raise InputError(f"bin_fields in {path} lack x, y or z")
+    return tuple(names)
 
 
 def kitti_odometry_layout(folder: Path) -> Layout:

@@ -21,6 +21,9 @@ BEAM_ALLOWANCE_M = 0.1
 """Heights count half in distances, and less where beams lie far apart, so that one beam gap costs
 no more than this: the next frame's beams hit the same wall at other heights."""
 
+FARTHEST_ECHO_M = 1_000.0
+"""Farther points are damage, not echoes."""
+
 LOW_SHARE = 0.4
 """Points above this share of the least height count as partners and join what stands on them."""
 
@@ -44,6 +47,9 @@ class SightedFrame:
 
     def __init__(self, registered: RegisteredFrame, settings: MotionSettings) -> None:
         points = registered.frame.points
+        beyond = np.abs(points).max(axis=1) > FARTHEST_ECHO_M
+        # What no sensor can have seen counts as no return: it would stretch every grid.
+        points = np.where(beyond[:, None], np.float32(0), points) if beyond.any() else points
         self.registered = registered
         self.gap = elevation_gap(points)
         self.view = RangeView(points, self.gap)

@@ -113,6 +113,8 @@ def count_beams(frame: Frame, elevation: NDArray[np.float64]) -> int:
         return len(np.unique(frame.ring))
     if frame.origin.any() or len(elevation) < 1000:
         return 0
+    if np.ptp(elevation) < ELEVATION_BIN_DEG:
+        return 1
     bins = np.arange(elevation.min(), elevation.max() + ELEVATION_BIN_DEG, ELEVATION_BIN_DEG)
     counts, _ = np.histogram(elevation, bins)
     smooth = np.convolve(np.convolve(counts, np.ones(5) / 5), np.ones(3) / 3, mode="same")

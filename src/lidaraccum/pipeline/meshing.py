@@ -44,6 +44,9 @@ class MeshSettings:
     tile_m: float = 0.0
 
     def __post_init__(self) -> None:
+        lengths = (self.normal_radius_m, self.trim_percentile, self.voxel_m, self.tile_m)
+        if not np.isfinite(lengths).all():
+            raise SettingsError("radius, percentile, voxel and tile must be finite numbers")
         if not 1 <= self.depth <= 16:
             raise SettingsError(f"depth {self.depth} is not within 1 to 16")
         if not 0 <= self.trim_percentile < 100:

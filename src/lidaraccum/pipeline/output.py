@@ -11,8 +11,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from lidaraccum.data.accumulation import AccumulatedFrame
-from lidaraccum.errors import OutputExistsError
-from lidaraccum.io.atomic import atomic, check_free, write_json, write_text
+from lidaraccum.errors import OutputExistsError, SettingsError
+from lidaraccum.io.atomic import atomic, check_free, json_text, write_text
 from lidaraccum.io.label_files import write_label_file
 from lidaraccum.io.poses import kitti_text, tum_text
 from lidaraccum.io.sequences import FileSequence
@@ -82,7 +82,9 @@ class LabelFiles:
 
     def write(self, frame: AccumulatedFrame) -> None:
         """Write the frame's file; frames of one name are told apart by their index."""
-        path = self._folder / f"{frame.name.split('.')[0] or frame.index}.label"
+        stem = frame.name.removesuffix(".pcd.bin")
+        stem = Path(stem).stem if stem == frame.name else stem
+        path = self._folder / f"{stem or frame.index}.label"
         if path.exists():
             path = self._folder / f"{frame.index:06d}.label"
         write_label_file(path, frame)
@@ -104,6 +106,9 @@ def check_outputs(output: OutputSettings) -> None:
         OutputExistsError: Something is there already.
     """
     check_suffix(output.path)
+    planned = [path.resolve() for path in planned_outputs(output)]
+    if len(set(planned)) < len(planned):
+        raise SettingsError("two outputs have the same name", hint="each needs its own")
     for path in planned_outputs(output):
         if path not in (output.labels_dir, output.objects_dir):
             check_free(path, output.overwrite)
@@ -111,6 +116,20 @@ def check_outputs(output: OutputSettings) -> None:
         _check_folder(output.labels_dir, ".label", overwrite=output.overwrite)
     if output.objects_dir is not None:
         _check_folder(output.objects_dir, output.path.suffix.lower(), overwrite=output.overwrite)
+
+
+def check_inputs_stay(sequence: FileSequence, output: OutputSettings) -> None:
+    """Refuse to write over what is read; an earlier output among the frames is found here too.
+
+    Raises:
+        SettingsError: An output is one of the inputs.
+    """
+    inputs = {path.resolve() for path in sequence.files}
+    for path in planned_outputs(output):
+        if path.resolve() in inputs:
+            raise SettingsError(
+                f"{path} is one of the input frames", hint="write the output into another folder"
+            )
 
 
 def _check_folder(folder: Path, suffix: str, *, overwrite: bool) -> None:
@@ -148,6 +167,8 @@ def accumulate_to_files(
         LidarAccumError: Nothing is left under a final name then.
     """
     check_outputs(output)
+    check_inputs_stay(sequence, output)
+    sequence.require_frames(2)
     accumulator = Accumulator(sequence, settings)
     cloud_settings = WriterSettings(
         overwrite=output.overwrite,
@@ -176,10 +197,14 @@ def accumulate_to_files(
             stamps.append(frame.stamp)
         report = report_of(sequence, accumulator, output.settings)
         if output.sidecars:
-            replace = output.overwrite
-            write_text(output.poses_path, kitti_text(np.stack(poses)), overwrite=replace)
-            stamped = tum_text(np.stack(poses), np.array(stamps))
-            write_text(output.tum_path, stamped, overwrite=replace)
-            write_json(output.objects_path, objects_json(accumulator.objects()), overwrite=replace)
-            write_json(output.report_path, asdict(report), overwrite=replace)
+            # All texts are made before the first is written: what fails here leaves none.
+            texts = {
+                output.poses_path: kitti_text(np.stack(poses)),
+                output.tum_path: tum_text(np.stack(poses), np.array(stamps)),
+                output.objects_path: json_text(objects_json(accumulator.objects())),
+                output.report_path: json_text(asdict(report)),
+            }
+            cloud.close()
+            for path, text in texts.items():
+                write_text(path, text, overwrite=output.overwrite)
     return report

@@ -65,7 +65,7 @@ class Reference:
             instance=perceived.instance,
             confidence=perceived.confidence,
             time=_seconds(frame, self._start),
-            range_m=np.linalg.norm(frame.points, axis=1),
+            range_m=frame.ranges,
             stamp=frame.stamp,
             reference_from_sensor=reference_from_sensor @ rigid.invert(file_from_local),
             attributes=_columns(frame),

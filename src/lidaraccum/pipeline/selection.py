@@ -35,6 +35,9 @@ class SelectionSettings:
     drop_dynamic: bool = False
 
     def __post_init__(self) -> None:
+        lengths = (self.voxel_m, self.min_range_m, self.max_range_m, *self.crop_m)
+        if not np.isfinite(lengths).all():
+            raise SettingsError("voxel size, ranges and crop must be finite numbers")
         if len(self.crop_m) not in (0, 4, 6):
             raise SettingsError(
                 f"a crop is 4 or 6 numbers, not {len(self.crop_m)}",

@@ -7,6 +7,8 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from typing import TypeVar
 
+from lidaraccum.errors import OutputError
+
 Item = TypeVar("Item")
 
 
@@ -18,7 +20,13 @@ def after_the_last(items: Iterable[Item]) -> Iterator[Item]:
     with tempfile.TemporaryFile() as waiting:
         count = 0
         for item in items:
-            pickle.dump(item, waiting, protocol=pickle.HIGHEST_PROTOCOL)
+            try:
+                pickle.dump(item, waiting, protocol=pickle.HIGHEST_PROTOCOL)
+            except OSError as error:
+                raise OutputError(
+                    f"frames cannot wait in the temporary folder: {error.strerror or error}",
+                    hint="TMPDIR names another; --reference first needs none",
+                ) from error
             count += 1
         waiting.seek(0)
         for _ in range(count):

@@ -28,6 +28,9 @@ from lidaraccum.registration.tracker import (
     Tracker,
 )
 
+CLEARLY_MORE = 0.05
+"""Poses are contradicted by others only where so much more of the points fits."""
+
 WINDOW = 5
 """Frames looked at together for the motion within a sweep."""
 
@@ -97,7 +100,8 @@ def compared(held: list[RegisteredFrame], free: list[RegisteredFrame]) -> list[R
         given_m = _step(held_before, held_now)
         found_m = _step(free_before, free_now)
         away_m = float(np.linalg.norm(given_m - found_m))
-        if away_m < CONTRADICTION_M or free_now.quality.doubts:
+        clearer = free_now.quality.overlap > held_now.quality.overlap + CLEARLY_MORE
+        if away_m < CONTRADICTION_M or free_now.quality.doubts or not clearer:
             frames.append(held_now)
             continue
         contradiction = f"the points say a step {away_m:.1f} m other than the given poses"

@@ -64,7 +64,7 @@ def usable_points(
     """Points (N,) that came back, are neither the carrying car nor far off, and stand still."""
     usable = frame.returned.copy()
     if not frame.origin.any():
-        distance = np.linalg.norm(frame.points, axis=1)
+        distance = frame.ranges
         if usable.any():
             near = INDOOR_SHARE * float(np.median(distance[usable]))
             usable &= distance >= min(settings.min_range_m, near)
