@@ -108,6 +108,16 @@ def test_what_stops_is_movable_but_still(look: Any, new_mover: Any) -> None:
     assert (frames[-1].instance[street.on[-1] == 1] == car).mean() > 0.8
 
 
+def test_nothing_moves_where_poses_are_doubtful(busy_street: Any) -> None:
+    frames = [
+        replace(frame, quality=replace(frame.quality, doubts=("it slipped",)))
+        for frame in busy_street.frames
+    ]
+    answers = list(LabelFree().perceive(frames))
+    assert len(answers) == len(frames)
+    assert not any(answer.label.any() for answer in answers)
+
+
 def test_every_frame_leaves_once_and_soon(busy_street: Any) -> None:
     read = 0
 

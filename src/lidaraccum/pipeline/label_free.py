@@ -88,7 +88,12 @@ class _Stream:
     def _look(self) -> None:
         window = list(self._waiting)[-self._settings.window :]
         expected = [track.expectation for track in self._association.tracks]
-        self._association.link(find_objects(window, self._settings, expected), window)
+        doubtful = [f.index for f in window if f.registered.quality.doubts]
+        if doubtful:
+            # Where a pose is wrong, all that stands would seem to move.
+            log.warning("no movers are sought around frame %d: its pose is doubtful", doubtful[0])
+        found = [] if doubtful else find_objects(window, self._settings, expected)
+        self._association.link(found, window)
         self._since_window = 0
 
     def _release(self) -> PerceivedFrame:
