@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import asdict
 from typing import Any
@@ -15,6 +14,7 @@ from lidaraccum.evaluation.evaluate import EvaluationReport, MethodReport
 from lidaraccum.evaluation.report_page import ECDF_AT_M
 from lidaraccum.evaluation.report_tables import PARTS, epe_by_gap
 from lidaraccum.evaluation.table import row_of, scene_row_of
+from lidaraccum.io.atomic import json_text
 from lidaraccum.metrics.association import IOU_THRESHOLDS
 
 
@@ -25,7 +25,7 @@ def as_json(report: EvaluationReport) -> str:
         "methods": [_method(one) for one in report.methods],
         "paper": [asdict(row) for row in paper.ROWS],
     }
-    return json.dumps(_without_nan(content), indent=1) + "\n"
+    return json_text(content)
 
 
 def _method(one: MethodReport) -> dict[str, Any]:
@@ -70,11 +70,3 @@ def _method(one: MethodReport) -> dict[str, Any]:
         ),
         "scenes": [asdict(row_of(scene.name, scene.scores)) for scene in one.scenes],
     }
-
-
-def _without_nan(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _without_nan(part) for key, part in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_without_nan(part) for part in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -74,7 +74,7 @@ def run_open3d(frames: Sequence[Frame]) -> float:
     previous, step = None, np.eye(4)
     for frame in frames:
         cloud = open3d.geometry.PointCloud()
-        near = frame.returned & (np.linalg.norm(frame.points, axis=1) < MAX_RANGE_M)
+        near = frame.returned & (frame.ranges < MAX_RANGE_M)
         cloud.points = open3d.utility.Vector3dVector(frame.points[near].astype(np.float64))
         cloud = cloud.voxel_down_sample(VOXEL_M)
         cloud.estimate_normals(open3d.geometry.KDTreeSearchParamKNN(NORMAL_NEIGHBOURS))
