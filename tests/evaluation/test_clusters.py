@@ -4,22 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lidaraccum.evaluation.clusters import cluster_points, cluster_window, dbscan
-
-
-def test_dbscan_joins_chains_takes_in_borders_and_leaves_noise() -> None:
-    chain = np.column_stack([np.arange(0, 2, 0.1), np.zeros(20)])
-    border, lonely = [[2.25, 0.0]], [[9.0, 9.0]]
-    found = dbscan(np.concatenate([chain, border, lonely]), 0.4, 5)
-    assert set(found[:21].tolist()) == {0}
-    assert found[21] == -1
-
-
-def test_dbscan_asks_for_enough_neighbours() -> None:
-    four = np.array([[0.0, 0], [0.1, 0], [0, 0.1], [0.1, 0.1]])
-    assert dbscan(four, 0.4, 5).tolist() == [-1] * 4
-    assert dbscan(four, 0.4, 4).tolist() == [0] * 4
-    assert dbscan(np.zeros((0, 2)), 0.4, 4).shape == (0,)
+from lidaraccum.evaluation.clusters import cluster_points, cluster_window
 
 
 def blobs() -> np.ndarray:

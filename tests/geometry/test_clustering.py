@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lidaraccum.geometry.clustering import connected_cells
+from lidaraccum.geometry.clustering import connected_cells, dbscan
 
 
 def blob(x: float, y: float) -> np.ndarray:
@@ -35,3 +35,26 @@ def test_order_changes_names_of_none_of_the_groups() -> None:
 
 def test_no_points_have_no_clusters() -> None:
     assert connected_cells(np.zeros((0, 3)), 0.3).shape == (0,)
+
+
+def test_dbscan_joins_chains_takes_in_borders_and_leaves_noise() -> None:
+    chain = np.column_stack([np.arange(0, 2, 0.1), np.zeros(20)])
+    border, lonely = [[2.25, 0.0]], [[9.0, 9.0]]
+    found = dbscan(np.concatenate([chain, border, lonely]), 0.4, 5)
+    assert set(found[:21].tolist()) == {0}
+    assert found[21] == -1
+
+
+def test_dbscan_asks_for_enough_neighbours() -> None:
+    four = np.array([[0.0, 0], [0.1, 0], [0, 0.1], [0.1, 0.1]])
+    assert dbscan(four, 0.4, 5).tolist() == [-1] * 4
+    assert dbscan(four, 0.4, 4).tolist() == [0] * 4
+    assert dbscan(np.zeros((0, 2)), 0.4, 4).shape == (0,)
+
+
+def test_a_weight_stands_for_as_many_points() -> None:
+    rng = np.random.default_rng(6)
+    places, weights = rng.uniform(0, 3, (60, 2)), rng.integers(1, 4, 60)
+    heaped = dbscan(np.repeat(places, weights, axis=0), 0.2, 6)
+    first = np.cumsum(weights) - weights
+    assert ((dbscan(places, 0.2, 6, weights) < 0) == (heaped[first] < 0)).all()

@@ -6,10 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
+from lidaraccum.geometry.clustering import dbscan
 from lidaraccum.geometry.voxel import voxel_keys
 
 VOXEL_M = 0.15
@@ -22,30 +20,6 @@ MIN_VOXELS = 15
 
 Points = NDArray[np.float64]
 Ids = NDArray[np.int32]
-
-
-def dbscan(positions: Points, radius_m: float, neighbours: int) -> NDArray[np.int64]:
-    """Cluster (N,), -1 for noise, of positions (N, D).
-
-    Ester et al., "A density-based algorithm" (KDD 1996); a point counts among its neighbours.
-    """
-    cluster = np.full(len(positions), -1, dtype=np.int64)
-    if len(positions) == 0:
-        return cluster
-    pairs = cKDTree(positions).query_pairs(radius_m, output_type="ndarray")
-    counts = 1 + np.bincount(pairs.ravel(), minlength=len(positions))
-    core = counts >= neighbours
-    one, two = pairs.T
-    both = core[one] & core[two]
-    links = coo_matrix(
-        (np.ones(int(both.sum())), (one[both], two[both])), shape=(len(positions),) * 2
-    )
-    _, named = connected_components(links, directed=False)
-    _, cluster[core] = np.unique(named[core], return_inverse=True)
-    for inner, border in ((one, two), (two, one)):
-        joins = core[inner] & ~core[border]
-        cluster[border[joins]] = cluster[inner[joins]]
-    return cluster
 
 
 def cluster_points(points: Points, min_voxels: int = MIN_VOXELS) -> Ids:

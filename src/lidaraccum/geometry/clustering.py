@@ -7,6 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 _EIGHT = np.ones((3, 3), dtype=np.int8)
 
@@ -25,3 +28,35 @@ def connected_cells(positions: NDArray[Any], cell_m: float) -> NDArray[np.int64]
     taken[cells[:, 0], cells[:, 1]] = 1
     named, _ = ndimage.label(taken, structure=_EIGHT)
     return named[cells[:, 0], cells[:, 1]].astype(np.int64) - 1
+
+
+def dbscan(
+    positions: NDArray[Any],
+    radius_m: float,
+    neighbours: int,
+    weights: NDArray[np.int64] | None = None,
+) -> NDArray[np.int64]:
+    """Cluster (N,), -1 for noise, of positions (N, D).
+
+    Ester et al., "A density-based algorithm" (KDD 1996); a point counts among its neighbours. With
+    ``weights`` (N,) a position stands for so many points.
+    """
+    cluster = np.full(len(positions), -1, dtype=np.int64)
+    if len(positions) == 0:
+        return cluster
+    weights = np.ones(len(positions), dtype=np.int64) if weights is None else weights
+    one, two = cKDTree(positions).query_pairs(radius_m, output_type="ndarray").T
+    counts = weights.astype(np.float64)
+    for own, other in ((one, two), (two, one)):
+        counts += np.bincount(own, weights[other], minlength=len(positions))
+    core = counts >= neighbours
+    both = core[one] & core[two]
+    links = coo_matrix(
+        (np.ones(int(both.sum())), (one[both], two[both])), shape=(len(positions),) * 2
+    )
+    _, named = connected_components(links, directed=False)
+    _, cluster[core] = np.unique(named[core], return_inverse=True)
+    for inner, border in ((one, two), (two, one)):
+        joins = core[inner] & ~core[border]
+        cluster[border[joins]] = cluster[inner[joins]]
+    return cluster
