@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 
 import torch
@@ -29,8 +30,11 @@ def _as_it_is(drive: list[TrainingWindow]) -> list[TrainingWindow]:
     return drive
 
 
-def _one_thread(_worker: int) -> None:
+def _begin(_worker: int) -> None:
     torch.set_num_threads(1)
+    # Ctrl-C and SIGTERM reach the whole process group, but how a run ends is for the trainer.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
 
 
 def batches_from(
@@ -61,6 +65,6 @@ def _drive_stream(source: WindowSource, first: int, workers: int) -> Iterator[li
         collate_fn=_as_it_is,
         prefetch_factor=_AHEAD if workers else None,
         multiprocessing_context="spawn" if workers else None,
-        worker_init_fn=_one_thread,
+        worker_init_fn=_begin,
     )
     yield from loader

@@ -6,7 +6,7 @@ import copy
 import logging
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -30,6 +30,7 @@ from lidaraccum.training.state import (
     restore_state,
     save_state,
 )
+from lidaraccum.training.watch import Watch
 from lidaraccum.training.window import Batch, TrainingWindow, make_batch
 
 _log = logging.getLogger(__name__)
@@ -59,7 +60,7 @@ def train(
     resume: bool = False,
     source: WindowSource | None = None,
     held_out: WindowSource | None = None,
-    on_step: Callable[[int, float], None] | None = None,
+    watch: Watch | None = None,
 ) -> TrainReport:
     """Train into a folder: ``weights.safetensors``, ``state.safetensors``, ``metrics.jsonl``.
 
@@ -69,7 +70,7 @@ def train(
         resume: Go on from the folder's state, if it has one.
         source: Where windows come from; simulated drives when None.
         held_out: Windows to validate on; seeds that never train, nor test, when None.
-        on_step: Told the step and its loss after each.
+        watch: Told how the run goes, and may end it.
 
     Raises:
         OutputExistsError: The folder holds a run and ``resume`` was not asked for.
@@ -81,8 +82,8 @@ def train(
         raise OutputExistsError(f"{out_dir} already holds a run", hint="resume it, or name another")
     if settings.threads:
         torch.set_num_threads(settings.threads)
-    run = _Run(settings, out_dir, source, held_out)
-    return run.go(on_step)
+    run = _Run(settings, out_dir, source, held_out, watch or Watch())
+    return run.go()
 
 
 class _Run:
@@ -94,8 +95,10 @@ class _Run:
         out_dir: Path,
         source: WindowSource | None,
         held_out: WindowSource | None,
+        watch: Watch,
     ) -> None:
         self.settings = settings
+        self.watch = watch
         self.out_dir = out_dir
         self.device = _pick_device(settings.device)
         self.state = _fresh_state(settings, self.device)
@@ -109,7 +112,7 @@ class _Run:
         self.began = time.monotonic() - self.state.seconds
         self.scores: Scores | None = None
 
-    def go(self, on_step: Callable[[int, float], None] | None) -> TrainReport:
+    def go(self) -> TrainReport:
         """Train to the end of the budget; the state is on the disk when this returns."""
         settings, state = self.settings, self.state
         saved = time.monotonic()
@@ -120,8 +123,7 @@ class _Run:
             losses = self._step(make_batch(next(batches), self.device))
             recent.append(losses.numbers())
             names = losses.names
-            if on_step:
-                on_step(state.step, recent[-1][0])
+            self.watch.on_step(state.step, recent[-1][0])
             if state.step % settings.log_steps == 0 or self._is_over():
                 self._note_losses(names, recent)
                 recent = []
@@ -144,7 +146,7 @@ class _Run:
 
     def _is_over(self) -> bool:
         steps, hours = self.settings.steps, self.settings.hours
-        if steps is not None and self.state.step >= steps:
+        if self.watch.wants_end() or (steps is not None and self.state.step >= steps):
             return True
         return hours is not None and time.monotonic() - self.began >= 3600.0 * hours
 
@@ -176,6 +178,7 @@ class _Run:
         self.scores = score_network(self.state.average, self._held_out_batches())
         seconds = time.monotonic() - self.began
         self.journal.note("score", self.state.step, seconds, asdict(self.scores))
+        self.watch.on_scores(self.state.step, self.scores)
 
     def _held_out_batches(self) -> Iterator[Batch]:
         for place in range(self.settings.validation_windows):
