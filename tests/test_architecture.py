@@ -38,6 +38,7 @@ HOMES_OF = {
     },
     "kiss_icp": {"evaluation/rivals"},
     "laspy": {"io"},
+    "matplotlib": {"training/curves"},
     "plyfile": {"io"},
     "torch": {"model", "training", "pipeline/perception"},
     "safetensors": {"model/checkpoint"},

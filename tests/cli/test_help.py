@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-COMMANDS = ("accumulate", "mesh", "info", "simulate", "evaluate", "benchmark", "config")
+COMMANDS = ("accumulate", "mesh", "info", "simulate", "evaluate", "benchmark", "train", "config")
 
 
 def test_help_names_every_command(run: Any) -> None:

@@ -12,6 +12,7 @@ from lidaraccum.cli.evaluate import evaluate
 from lidaraccum.cli.info import info
 from lidaraccum.cli.mesh import mesh
 from lidaraccum.cli.simulate import simulate
+from lidaraccum.cli.train import train
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -24,5 +25,5 @@ def cli() -> None:
     """
 
 
-for command in (accumulate, mesh, info, simulate, evaluate, benchmark, config):
+for command in (accumulate, mesh, info, simulate, evaluate, benchmark, train, config):
     cli.add_command(command)

@@ -1,14 +1,14 @@
 """Options that several commands share, each defined once.
 
 A setting comes from its flag, then ``LIDARACCUM_NAME`` in the environment, then the TOML file
-given with ``--config``, then its default.
+given with ``--config``, then its default. A table in the file is for the command of its name alone.
 """
 
 from __future__ import annotations
 
 import difflib
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +34,13 @@ class Numbers(click.ParamType):  # type: ignore[type-arg,unused-ignore]
             self.fail(f"{value!r} is not a list of numbers like 1,2,3", param, ctx)
 
 
-def _read_toml(path: Path) -> dict[str, Any]:
+TABLES = ("train",)
+"""Commands that have settings beyond their options; the other commands pass over their tables."""
+_META = "lidaraccum.tables"
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """What a TOML file says; a usage error when it is none."""
     if sys.version_info >= (3, 11):
         import tomllib
     else:
@@ -55,8 +61,10 @@ def _load_config(ctx: click.Context, param: click.Parameter, path: Path | None) 
         for flag in option.opts
         if isinstance(option, click.Option) and flag.startswith("--") and option.name != param.name
     }
+    content = read_toml(path)
+    ctx.meta[_META] = {name: content.pop(name) for name in TABLES if name in content}
     values = {}
-    for key, value in _read_toml(path).items():
+    for key, value in content.items():
         name = known.get(key.replace("_", "-"))
         if name is None:
             near = difflib.get_close_matches(key.replace("_", "-"), known, n=1)
@@ -65,6 +73,14 @@ def _load_config(ctx: click.Context, param: click.Parameter, path: Path | None) 
         values[name] = value
     ctx.default_map = {**(ctx.default_map or {}), **values}
     return path
+
+
+def table_of(ctx: click.Context, name: str) -> Mapping[str, Any]:
+    """The table of that name in the ``--config`` file; empty when there is none."""
+    table = ctx.meta.get(_META, {}).get(name, {})
+    if not isinstance(table, Mapping):
+        raise click.BadParameter(f"{name!r} is a table in the TOML file, not {table!r}")
+    return table
 
 
 def _stack(*decorators: Decorator) -> Decorator:

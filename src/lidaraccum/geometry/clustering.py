@@ -60,3 +60,21 @@ def dbscan(
         joins = core[inner] & ~core[border]
         cluster[border[joins]] = cluster[inner[joins]]
     return cluster
+
+
+def dense_groups(
+    positions: NDArray[Any], cell_m: float, radius_m: float, neighbours: int
+) -> NDArray[np.int64]:
+    """Cluster (N,), from 0, -1 for noise, of positions (N, 2): `dbscan` of the cells they fill.
+
+    Points of one cell, ``cell_m`` wide, are taken together at their mean, so that many points in
+    one place (votes for a centre) cost no more than a few.
+    """
+    if len(positions) == 0:
+        return np.zeros(0, dtype=np.int64)
+    cells = np.floor(positions * (1.0 / cell_m)).astype(np.int64)
+    cells -= cells.min(axis=0)
+    keys = cells[:, 0] * (cells[:, 1].max() + 1) + cells[:, 1]
+    _, cell, counts = np.unique(keys, return_inverse=True, return_counts=True)
+    means = np.stack([np.bincount(cell, axis) / counts for axis in positions.T], axis=1)
+    return dbscan(means, radius_m, neighbours, counts)[cell]

@@ -1,4 +1,4 @@
-"""How good the network is on windows it does not learn from."""
+"""How good the network is on windows it does not learn from: stage by stage, and all together."""
 
 from __future__ import annotations
 
@@ -7,26 +7,21 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
-from lidaraccum.metrics import segmentation
-from lidaraccum.metrics.flow import FlowErrors, flow_errors
 from lidaraccum.metrics.segmentation import SegmentationCounts
-from lidaraccum.model.batch import to_arrays
-from lidaraccum.model.kabsch import move
-from lidaraccum.model.network import Network, Perception
-from lidaraccum.model.precision import inference
-from lidaraccum.training.objective import (
-    object_poses,
-    object_truth,
-    offset_truth,
-    source_index,
-)
+from lidaraccum.model.network import Network
+from lidaraccum.training.end_to_end import EndToEnd
+from lidaraccum.training.stages import StageScores, score_stages
 from lidaraccum.training.window import Batch
 
 
 @dataclass(frozen=True)
 class Scores:
     """Scores of the network alone; NaN where there was nothing to score.
+
+    Down to ``object_still_m`` each stage is given the truth of those before it; from
+    ``static_epe_m`` on the network does all of it itself, as in the paper's tables.
 
     Attributes:
         windows: How many were scored.
@@ -41,6 +36,18 @@ class Scores:
         offset_m: Mean error of the offsets of dynamic points.
         object_epe_m: Mean error of dynamic source points, true masks, true poses, TubeNet's motion.
         object_still_m: The same if every object were taken to stand still.
+        static_epe_m: Mean error of the flow of static source points, false movers among them.
+        static_acc_strict: Share of them within 5 cm or 5 %.
+        still_epe_m: Mean error of those of them on something that can move.
+        dynamic_epe_m: Mean error of the flow of dynamic source points.
+        dynamic_median_m: Median of the same.
+        dynamic_acc_strict: Share of them within 5 cm or 5 %.
+        dynamic_acc_relaxed: Share within 10 cm or 10 %.
+        dynamic_robust_outlier: Share off by more than 30 cm and more than 30 %.
+        alone_motion_precision: Of annotated points, own poses, 0..1.
+        alone_motion_recall: 0..1.
+        coverage: WCov of all objects, 0..1.
+        moving_coverage: WCov of those that truly move, 0..1.
     """
 
     windows: int
@@ -55,25 +62,33 @@ class Scores:
     offset_m: float
     object_epe_m: float
     object_still_m: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Answers:
-    foreground: SegmentationCounts
-    motion: SegmentationCounts
-    ego: list[FlowErrors]
-    offset: np.ndarray
-    objects: FlowErrors
-    still: FlowErrors
+    static_epe_m: float
+    static_acc_strict: float
+    still_epe_m: float
+    dynamic_epe_m: float
+    dynamic_median_m: float
+    dynamic_acc_strict: float
+    dynamic_acc_relaxed: float
+    dynamic_robust_outlier: float
+    alone_motion_precision: float
+    alone_motion_recall: float
+    coverage: float
+    moving_coverage: float
 
 
 def score_network(network: Network, batches: Iterable[Batch]) -> Scores:
-    """Score a network on batches of one window each, poses of the motion branch true."""
+    """Score a network on batches of one window each."""
     was_training = network.training
     network.eval()
     with torch.no_grad():
-        answers = [_answer(network, batch) for batch in batches]
+        answers = [score_stages(network, batch) for batch in batches]
     network.train(was_training)
+    return _pool(answers)
+
+
+def _pool(answers: list[StageScores]) -> Scores:
+    alone = EndToEnd.pool(answer.alone for answer in answers)
+    static, dynamic = alone.flow.static, alone.flow.dynamic
     foreground = SegmentationCounts.pool(answer.foreground for answer in answers)
     motion = SegmentationCounts.pool(answer.motion for answer in answers)
     pairs = [errors.epe.mean() for answer in answers for errors in answer.ego if len(errors)]
@@ -90,85 +105,21 @@ def score_network(network: Network, batches: Iterable[Batch]) -> Scores:
         offset_m=_mean([answer.offset for answer in answers]),
         object_epe_m=_mean([answer.objects.epe for answer in answers]),
         object_still_m=_mean([answer.still.epe for answer in answers]),
+        static_epe_m=static.epe_mean,
+        static_acc_strict=static.acc_strict,
+        still_epe_m=alone.flow.static_foreground.epe_mean,
+        dynamic_epe_m=dynamic.epe_mean,
+        dynamic_median_m=dynamic.epe_median,
+        dynamic_acc_strict=dynamic.acc_strict,
+        dynamic_acc_relaxed=dynamic.acc_relaxed,
+        dynamic_robust_outlier=dynamic.robust_outlier,
+        alone_motion_precision=alone.motion.precision,
+        alone_motion_recall=alone.motion.recall,
+        coverage=alone.association.weighted_coverage,
+        moving_coverage=alone.moving.weighted_coverage,
     )
 
 
-def _mean(parts: list[np.ndarray]) -> float:
+def _mean(parts: list[NDArray[np.float64]]) -> float:
     values = np.concatenate([np.zeros(0), *parts])
     return float(values.mean()) if len(values) else float("nan")
-
-
-def _answer(network: Network, batch: Batch) -> _Answers:
-    truth = batch.truth
-    with inference(batch.frames.points.device):
-        features = network.encode(batch.frames)
-        match = network.match_windows(features, batch.windows)
-        perception = network.perceive(features, truth.target_from_frame, batch.windows)
-        true_points = torch.nonzero(truth.object_row >= 0)[:, 0]
-        oracle = network.perceive(
-            features, truth.target_from_frame, batch.windows, points=true_points
-        )
-        objects, still = _object_errors(network, batch, oracle)
-    foreground, motion = _segmentation(batch, perception)
-    aligned = object_poses(batch, truth.target_from_frame)
-    wanted, has = offset_truth(oracle, truth, aligned)
-    has &= truth.dynamic[oracle.point]
-    off = torch.linalg.vector_norm(oracle.offset - wanted, dim=1)[has]
-    return _Answers(
-        foreground, motion, _ego_errors(batch, match.target_from_source), to_arrays(off),
-        objects, still,
-    )  # fmt: skip
-
-
-def _segmentation(
-    batch: Batch, perception: Perception
-) -> tuple[SegmentationCounts, SegmentationCounts]:
-    truth = batch.truth
-    foreground = torch.zeros_like(truth.foreground)
-    dynamic = torch.zeros_like(truth.foreground)
-    movable = perception.foreground > 0
-    foreground[perception.point] = movable
-    dynamic[perception.point] = movable & (perception.dynamic > 0)
-    told = truth.annotated
-    return (
-        segmentation.compare(foreground[told].cpu().numpy(), truth.foreground[told].cpu().numpy()),
-        segmentation.compare(dynamic[told].cpu().numpy(), truth.dynamic[told].cpu().numpy()),
-    )
-
-
-def _ego_errors(batch: Batch, estimated: torch.Tensor) -> list[FlowErrors]:
-    """Errors of each source frame's static points, target's sensor coordinates."""
-    frames, truth = batch.frames, batch.truth
-    owner = frames.point_frame
-    errors = []
-    for pose, index in zip(estimated, source_index(batch).tolist(), strict=True):
-        own = (owner == index) & ~truth.dynamic
-        sensor = move(torch.linalg.inv(frames.level_from_sensor[index]), frames.points[own])
-        moved = move(pose, sensor) - sensor
-        wanted = move(truth.target_from_frame[index], sensor) - sensor
-        errors.append(flow_errors(to_arrays(moved), to_arrays(wanted)))
-    return errors
-
-
-def _object_errors(
-    network: Network, batch: Batch, oracle: Perception
-) -> tuple[FlowErrors, FlowErrors]:
-    """Errors of dynamic source points of known objects, of TubeNet and of standing still."""
-    truth = batch.truth
-    row = truth.object_row[oracle.point]
-    nothing = FlowErrors(np.zeros(0), np.zeros(0))
-    if len(row) == 0:
-        return nothing, nothing
-    objects = network.track(oracle, row + 1)
-    aligned = object_poses(batch, truth.target_from_frame)
-    motion, _ = object_truth(objects, truth, aligned, objects.ids - 1)
-    tubes = objects.tubes
-    at = (tubes.instance, tubes.time)
-    known = truth.known[objects.ids - 1][at]
-    moving = truth.dynamic[oracle.point] & known & (tubes.time != tubes.anchor_time[at[0]])
-    points = oracle.position[moving][:, None]
-    mine = (tubes.instance[moving], tubes.time[moving])
-    there = move(objects.target_from_aligned[mine], points)[:, 0] - points[:, 0]
-    wanted = move(motion[mine], points)[:, 0] - points[:, 0]
-    true_flow = to_arrays(wanted)
-    return flow_errors(to_arrays(there), true_flow), flow_errors(0.0 * true_flow, true_flow)

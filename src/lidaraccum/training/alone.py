@@ -1,0 +1,112 @@
+"""The network doing all of it: its own poses, masks, objects and motions. No truth in here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from lidaraccum.geometry.clustering import dense_groups
+from lidaraccum.geometry.voxel import voxel_keys
+from lidaraccum.model.batch import FrameTensors, to_arrays, to_indices
+from lidaraccum.model.kabsch import chain, invert, move
+from lidaraccum.model.motion import Windows
+from lidaraccum.model.network import FrameFeatures, Network, Perception, close_points
+
+VOXEL_M = 0.15
+"""The paper, section 3.4: points are thinned before they are clustered."""
+CELL_M = 0.05
+RADIUS_M = 0.4
+NEIGHBOURS = 5
+MIN_VOXELS = 15
+"""DBSCAN of positions plus offsets, seen from above, and its least cluster; METHOD.md section 4."""
+MOST_POINTS = 200_000
+"""Of more points that pass the gate (weights that take all for movable) only every second or so."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What is said of the P points of one window's frames.
+
+    Attributes:
+        placed: (P, 3) float64 metres: where they belong in the target's sensor coordinates.
+        dynamic: (P,) bool.
+        instance: (P,) int64, 0 for none.
+    """
+
+    placed: NDArray[np.float64]
+    dynamic: NDArray[np.bool_]
+    instance: NDArray[np.int64]
+
+
+def answer_alone(
+    network: Network, features: FrameFeatures, windows: Windows, target_from_source: torch.Tensor
+) -> Answer:
+    """What the network says of one window, with its own poses of the source frames."""
+    frames, target = features.frames, windows.target[0]
+    poses = own_poses(windows, target_from_source)
+    points = close_points(features)
+    points = points[:: len(points) // MOST_POINTS + 1]
+    seen = network.perceive(features, poses, windows, points)
+    movable = seen.foreground > 0
+    moving = movable & (seen.dynamic > 0)
+    ids = torch.zeros_like(seen.point)
+    ids[movable] = _clusters(seen, movable).to(ids.device)
+    level = chain(frames.level_from_sensor[target], poses, invert(frames.level_from_sensor))
+    placed = move_frames(frames, level)
+    chosen = ids > 0
+    if chosen.any():
+        objects = network.track(seen, ids)
+        own = objects.target_from_aligned[objects.tubes.instance, objects.tubes.time]
+        there = move(own, seen.position[chosen][:, None])[:, 0]
+        goes = moving[chosen]
+        placed[seen.point[chosen][goes]] = there[goes]
+    dynamic = torch.zeros(len(placed), dtype=torch.bool, device=placed.device)
+    dynamic[seen.point] = moving
+    instance = torch.zeros(len(placed), dtype=torch.int64, device=placed.device)
+    instance[seen.point] = ids
+    sensor = move(invert(frames.level_from_sensor[target]), placed)
+    return Answer(to_arrays(sensor), dynamic.cpu().numpy(), to_indices(instance))
+
+
+def move_frames(frames: FrameTensors, motion: torch.Tensor) -> torch.Tensor:
+    """The points (P, 3), each moved by its frame's motion (F, 4, 4) out of level coordinates."""
+    parts = torch.split(frames.points, list(frames.point_counts))
+    return torch.cat([move(own, part) for own, part in zip(motion, parts, strict=True)])
+
+
+def own_poses(windows: Windows, target_from_source: torch.Tensor) -> torch.Tensor:
+    """(F, 4, 4) target_from_frame of all frames: proposed for the sources, identity for targets."""
+    targets = windows.target_of_frame
+    sources = [frame for frame, target in enumerate(targets) if frame != target]
+    proposed = target_from_source.float()
+    poses = torch.eye(4, device=proposed.device).repeat(len(targets), 1, 1)
+    return poses.index_copy(0, torch.tensor(sources, device=proposed.device), proposed)
+
+
+def _clusters(seen: Perception, movable: torch.Tensor) -> torch.Tensor:
+    positions, offsets = to_arrays(seen.position[movable]), to_arrays(seen.offset[movable])
+    return torch.from_numpy(cluster_by_offsets(positions, offsets))
+
+
+def cluster_by_offsets(
+    positions: NDArray[np.float64], offsets: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Object (N,), 0 for none, from 1, of points (N, 3) with offsets (N, 2) to centres, metres.
+
+    Source: the paper, section 3.4.
+    """
+    if len(positions) == 0:
+        return np.zeros(0, dtype=np.int64)
+    keys = voxel_keys(positions, VOXEL_M)
+    _, voxel, counts = np.unique(keys, return_inverse=True, return_counts=True)
+    centres = (positions[:, :2] + offsets).T
+    means = np.stack([np.bincount(voxel, axis) / counts for axis in centres], axis=1)
+    cluster = dense_groups(means, CELL_M, RADIUS_M, NEIGHBOURS)
+    sizes = np.bincount(cluster[cluster >= 0], minlength=1)
+    kept = np.flatnonzero(sizes >= MIN_VOXELS)
+    number = np.zeros(len(sizes) + 1, dtype=np.int64)
+    number[kept] = np.arange(1, len(kept) + 1)
+    return number[cluster][voxel]
