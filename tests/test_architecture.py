@@ -40,6 +40,7 @@ HOMES_OF = {
     "laspy": {"io"},
     "matplotlib": {"training/curves"},
     "plyfile": {"io"},
+    "pyarrow": {"io/driving"},
     "torch": {"model", "training", "pipeline/perception"},
     "safetensors": {"model/checkpoint"},
     "tqdm": {"cli", "batch", "training"},

@@ -8,7 +8,17 @@ from typing import Any
 
 import pytest
 
-COMMANDS = ("accumulate", "mesh", "info", "simulate", "evaluate", "benchmark", "train", "config")
+COMMANDS = (
+    "accumulate",
+    "mesh",
+    "info",
+    "simulate",
+    "convert",
+    "evaluate",
+    "benchmark",
+    "train",
+    "config",
+)
 
 
 def test_help_names_every_command(run: Any) -> None:

@@ -8,6 +8,7 @@ import lidaraccum
 from lidaraccum.cli.accumulate import accumulate
 from lidaraccum.cli.benchmark import benchmark
 from lidaraccum.cli.config import config
+from lidaraccum.cli.convert import convert
 from lidaraccum.cli.evaluate import evaluate
 from lidaraccum.cli.info import info
 from lidaraccum.cli.mesh import mesh
@@ -25,5 +26,5 @@ def cli() -> None:
     """
 
 
-for command in (accumulate, mesh, info, simulate, evaluate, benchmark, train, config):
+for command in (accumulate, mesh, info, simulate, convert, evaluate, benchmark, train, config):
     cli.add_command(command)

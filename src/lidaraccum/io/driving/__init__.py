@@ -1,0 +1,1 @@
+"""Driving data sets in: logs with tracked boxes as labelled sequences."""
