@@ -46,6 +46,17 @@ def test_six_steps_are_three_steps_and_three_resumed(toy: ModuleType, tmp_path: 
         torch.testing.assert_close(parts[name], tensor, atol=2e-4, rtol=0)
 
 
+def is_alive_for(seconds: float, process: str) -> bool:
+    """Whether a process still runs after so long; one that nobody has buried yet does not."""
+    status = Path(f"/proc/{process}/status")
+    deadline = time.monotonic() + seconds
+    while status.exists() and "State:\tZ" not in status.read_text():
+        if time.monotonic() > deadline:
+            return True
+        time.sleep(0.05)
+    return False
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", [0, 1])
 def test_a_killed_run_leaves_whole_files_and_goes_on(
@@ -58,8 +69,11 @@ def test_a_killed_run_leaves_whole_files_and_goes_on(
         if (tmp_path / METRICS_FILE).exists() and len(curve(tmp_path)) >= 3:
             break
         time.sleep(0.05)
+    children = Path(f"/proc/{run.pid}/task/{run.pid}/children")
+    started = children.read_text().split() if children.exists() else []
     run.kill()
     run.wait()
+    assert not any(is_alive_for(10.0, child) for child in started)
     _, metadata = read_tensors(tmp_path / STATE_FILE)
     done = int(metadata["step"])
     assert done >= 2
