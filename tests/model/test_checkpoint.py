@@ -14,10 +14,10 @@ from lidaraccum.model.checkpoint import (
     load_network,
     read_tensors,
     save_network,
-    weights_hash,
     write_tensors,
 )
 from lidaraccum.model.network import Network
+from lidaraccum.model.weights import weights_hash
 
 
 def test_the_network_comes_back_with_its_settings_and_answers(

@@ -108,14 +108,36 @@ def test_what_stops_is_movable_but_still(look: Any, new_mover: Any) -> None:
     assert (frames[-1].instance[street.on[-1] == 1] == car).mean() > 0.8
 
 
-def test_nothing_moves_where_poses_are_doubtful(busy_street: Any) -> None:
-    frames = [
-        replace(frame, quality=replace(frame.quality, doubts=("it slipped",)))
-        for frame in busy_street.frames
+def doubted(frames: list[RegisteredFrame]) -> list[RegisteredFrame]:
+    return [
+        replace(frame, quality=replace(frame.quality, doubts=("it slipped",))) for frame in frames
     ]
-    answers = list(LabelFree().perceive(frames))
-    assert len(answers) == len(frames)
-    assert not any(answer.label.any() for answer in answers)
+
+
+def test_a_doubt_alone_hides_no_mover(busy: list[PerceivedFrame], busy_street: Any) -> None:
+    for frame, again in zip(busy, perceive(doubted(busy_street.frames)), strict=True):
+        assert (frame.label == again.label).all()
+
+
+@pytest.mark.parametrize("shift", [(1.0, 0.0, 0.0), (0.3, 0.9, 0.0), (3.0, -2.0, 0.0)])
+def test_where_a_pose_slipped_nothing_that_stands_moves(
+    look: Any, shift: tuple[float, float, float]
+) -> None:
+    slip = rigid.translation(shift)
+    frames = [
+        replace(frame, world_from_sensor=slip @ frame.world_from_sensor) if place > 3 else frame
+        for place, frame in enumerate(look().frames)
+    ]
+    for frame in perceive(doubted(frames)):
+        assert (frame.label == MOVING).mean() < 0.02
+
+
+def test_where_poses_make_most_of_the_scene_move_it_stands(look: Any) -> None:
+    """The sensor drove at 6 m/s and is said to have stood: all it passes would come towards it."""
+    frames = doubted(look().frames)
+    stuck = [replace(one, world_from_sensor=frames[0].world_from_sensor) for one in frames]
+    for frame in perceive(stuck):
+        assert not (frame.label == MOVING).any()
 
 
 def test_every_frame_leaves_once_and_soon(busy_street: Any) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from collections.abc import Mapping
@@ -65,11 +64,6 @@ def _settings(text: str, path: Path) -> NetworkSettings:
         unknown = ", ".join(sorted(set(values) - known))
         raise InputError(f"{path} was written by a newer version: {unknown} are unknown here")
     return NetworkSettings(**values)
-
-
-def weights_hash(path: Path) -> str:
-    """SHA-256 of the file, hexadecimal: what a report names."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def write_tensors(

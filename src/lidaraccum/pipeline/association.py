@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lidaraccum.geometry import rigid
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
+from lidaraccum.pipeline.object_ids import ObjectIds
 from lidaraccum.pipeline.objects import Expectation, WindowObject
 from lidaraccum.pipeline.shape import ObjectShape
 
@@ -94,10 +95,10 @@ class Track:
 class Association:
     """The movers known so far; each window's movers continue them or begin new ones."""
 
-    def __init__(self, settings: MotionSettings) -> None:
+    def __init__(self, settings: MotionSettings, ids: ObjectIds | None = None) -> None:
         self._settings = settings
+        self._ids = ids or ObjectIds()
         self._windows = 0
-        self._next = 1
         self.tracks: list[Track] = []
 
     def link(self, objects: Sequence[WindowObject], frames: Sequence[SightedFrame]) -> None:
@@ -111,8 +112,7 @@ class Association:
         for found in objects:
             track = _same(found, known)
             if track is None:
-                track = Track(self._next, found.velocity, found.centre, found.stamp)
-                self._next += 1
+                track = Track(self._ids.new(), found.velocity, found.centre, found.stamp)
                 self.tracks.append(track)
             track.take(found, frames)
 

@@ -126,6 +126,10 @@ class SightedFrame:
         """Some of the obstacles (K,) in the world, (K, 3) metres."""
         return rigid.transform(self.world_from_sensor, self.points[picked])
 
+    def world_of_near(self) -> NDArray[np.float64]:
+        """Obstacles and low points in the world, (M + L, 3) metres."""
+        return rigid.transform(self.world_from_sensor, self.near_points)
+
     def watch(self, other: SightedFrame) -> None:
         """Count what this frame saw at the other frame's obstacles."""
         sensor_from_other = self.sensor_from_world @ other.world_from_sensor

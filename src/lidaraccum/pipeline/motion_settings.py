@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from lidaraccum.errors import SettingsError
+
+SURE = 0.8
+TRUSTED_SHARE = 0.5
+"""Where a proposer is so sure that something moves, this share of the margin and of the way is
+enough."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +69,21 @@ class MotionSettings:
             raise SettingsError(
                 f"windows must share a frame: stride {self.stride}, window {self.window}"
             )
+
+    def trusting(self, trust: float) -> MotionSettings:
+        """What a mover must show that a proposer is so sure of, 0..1: less, but never nothing.
+
+        Below `SURE` it must show as much as any other. Above, moving must still explain the points
+        better than standing, but nobody need have seen through its place.
+        """
+        if trust < SURE:
+            return self
+        return replace(
+            self,
+            margin=TRUSTED_SHARE * self.margin,
+            min_shift_m=TRUSTED_SHARE * self.min_shift_m,
+            min_through=-1.0,
+        )
 
 
 CONSERVATIVE = MotionSettings(

@@ -14,7 +14,7 @@ from lidaraccum.geometry.voxel import thin
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.hypotheses import propose
 from lidaraccum.pipeline.motion_settings import MotionSettings
-from lidaraccum.pipeline.suspects import Suspect, Template, find_suspects, make_template
+from lidaraccum.pipeline.suspects import Lead, Suspect, Template, find_suspects, make_template
 from lidaraccum.pipeline.verdict import Verdict, judge, judge_points, refine_velocity
 
 TEMPLATE_POINTS = 80
@@ -25,6 +25,9 @@ PROBES = 5
 
 EXPECTED_M = 1.5
 """A suspect this near to where a mover must be by now may be it."""
+
+CLAIMED_SHARE = 0.3
+"""A suspect with more than this share of points that are a mover's is part of it."""
 
 JOIN_M = 0.4
 WHOLE_SHARE = 0.5
@@ -84,6 +87,7 @@ def find_objects(
     frames: Sequence[SightedFrame],
     settings: MotionSettings,
     expected: Sequence[Expectation] = (),
+    leads: Sequence[Lead] = (),
 ) -> list[WindowObject]:
     """The movers of a window whose frames have watched one another.
 
@@ -92,24 +96,48 @@ def find_objects(
         settings: What counts as a mover.
         expected: Movers of earlier windows: their motions are tried first, and nothing else is
             where they explain the points.
+        leads: Proposed movers, tried before what free space raises suspicion of.
     """
+    claimed = _Claimed(frames)
+    for lead in leads:
+        if not claimed.has(lead.suspect):
+            stamp = frames[lead.suspect.frame].stamp
+            known = _expected_velocities(lead.suspect, stamp, expected)
+            proposals = np.concatenate([known, lead.velocities])
+            claimed.add(explain(lead.suspect, proposals, frames, settings.trusting(lead.trust)))
     suspects = find_suspects(frames, settings)
-    taken = {frame.index: np.zeros(len(frame.rows), dtype=np.bool_) for frame in frames}
-    objects: list[WindowObject] = []
     for suspect in suspects:
-        if taken[frames[suspect.frame].index][suspect.picked].mean() > 0.3:
+        if claimed.has(suspect):
             continue
         known = _expected_velocities(suspect, frames[suspect.frame].stamp, expected)
         found = explain(suspect, known, frames, settings) if len(known) else None
         if found is None:
             proposals = propose(suspect, suspects, frames, settings)
             found = explain(suspect, proposals, frames, settings)
+        claimed.add(found)
+    return join_parts(claimed.objects, frames)
+
+
+class _Claimed:
+    """The movers found so far and the obstacles that are theirs."""
+
+    def __init__(self, frames: Sequence[SightedFrame]) -> None:
+        self._frames = frames
+        self._taken = {frame.index: np.zeros(len(frame.rows), dtype=np.bool_) for frame in frames}
+        self.objects: list[WindowObject] = []
+
+    def has(self, suspect: Suspect) -> bool:
+        """Whether a suspect is part of a mover already."""
+        taken = self._taken[self._frames[suspect.frame].index][suspect.picked]
+        return bool(taken.mean() > CLAIMED_SHARE)
+
+    def add(self, found: WindowObject | None) -> None:
+        """A mover, where one was found."""
         if found is None:
-            continue
+            return
         for index, picked in found.picked.items():
-            taken[index][picked] = True
-        objects.append(found)
-    return join_parts(objects, frames)
+            self._taken[index][picked] = True
+        self.objects.append(found)
 
 
 def _expected_velocities(

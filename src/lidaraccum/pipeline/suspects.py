@@ -35,6 +35,21 @@ class Suspect:
         return len(self.picked)
 
 
+@dataclass(frozen=True, eq=False)
+class Lead:
+    """A proposed mover of a window: worth a look, no more.
+
+    Attributes:
+        suspect: Its points in one frame.
+        velocities: (H, 3) m/s, world: how it may move.
+        trust: 0..1: how sure the proposer is that it moves.
+    """
+
+    suspect: Suspect
+    velocities: NDArray[np.float64]
+    trust: float
+
+
 def find_suspects(frames: Sequence[SightedFrame], settings: MotionSettings) -> list[Suspect]:
     """All suspects of a window's frames, those with most points first."""
     needed = min(2, len(frames) - 1)

@@ -1,0 +1,105 @@
+"""Frames in, frames with their movers out: windows are searched as frames come by."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+
+from lidaraccum.data.perceived import PerceivedFrame
+from lidaraccum.data.registered import RegisteredFrame
+from lidaraccum.pipeline.advice import Advice
+from lidaraccum.pipeline.association import Association
+from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.motion_settings import MotionSettings
+from lidaraccum.pipeline.object_ids import ObjectIds
+from lidaraccum.pipeline.objects import WindowObject, find_objects
+from lidaraccum.pipeline.painting import Canvas, paint_mover
+
+log = logging.getLogger(__name__)
+
+MOST_MOVING = 0.3
+"""Where a pose is doubtful and more than this share of all obstacles of a window seems to move, it
+is the pose that is wrong."""
+
+
+class MoverStream:
+    """The frames in flight: waiting for their windows, then for the windows that confirm them.
+
+    Args:
+        settings: What counts as a mover.
+        advice: Who proposes movers, besides free space.
+        ids: Where the movers' ids come from.
+    """
+
+    def __init__(
+        self, settings: MotionSettings, advice: Advice, ids: ObjectIds | None = None
+    ) -> None:
+        self._settings = settings
+        self._advice = advice
+        self._association = Association(settings, ids or ObjectIds())
+        self._waiting: deque[SightedFrame] = deque()
+        self._since_window = 0
+
+    def run(self, frames: Iterable[RegisteredFrame]) -> Iterator[PerceivedFrame]:
+        """Each frame once, in order, its movers labelled and placed."""
+        for registered in frames:
+            yield from self._push(registered)
+        if self._since_window and len(self._waiting) > 1:
+            self._look()
+        while self._waiting:
+            yield self._release()
+
+    def _push(self, registered: RegisteredFrame) -> Iterator[PerceivedFrame]:
+        frame = SightedFrame(registered, self._settings)
+        for other in list(self._waiting)[-(self._settings.window - 1) :]:
+            frame.watch(other)
+            other.watch(frame)
+        self._waiting.append(frame)
+        self._advice.see(frame)
+        self._since_window += 1
+        if len(self._waiting) < self._settings.window or not self._is_due():
+            return
+        self._look()
+        while len(self._waiting) >= self._settings.window + self._settings.stride:
+            yield self._release()
+
+    def _is_due(self) -> bool:
+        first = self._since_window == len(self._waiting)
+        return first or self._since_window >= self._settings.stride
+
+    def _look(self) -> None:
+        window = list(self._waiting)[-self._settings.window :]
+        expected = [track.expectation for track in self._association.tracks]
+        leads = self._advice.leads(window)
+        found = find_objects(window, self._settings, expected, leads)
+        if _is_pose_wrong(found, window):
+            found = []
+        self._association.link(found, window)
+        self._since_window = 0
+
+    def _release(self) -> PerceivedFrame:
+        frame = self._waiting.popleft()
+        sure = [track for track in self._association.tracks if self._association.is_sure(track)]
+        canvas = Canvas(frame)
+        for track in sorted(sure, key=lambda track: -len(track.picked.get(frame.index, ()))):
+            paint_mover(track, frame, canvas, self._settings.box_growth)
+        for track in self._association.tracks:
+            track.forget(frame.index)
+        self._advice.name_still(frame, canvas)
+        return canvas.perceived()
+
+
+def _is_pose_wrong(found: Sequence[WindowObject], window: Sequence[SightedFrame]) -> bool:
+    """Whether it is a doubtful pose, not the movers found, that makes things seem to move."""
+    doubtful = [frame.index for frame in window if frame.registered.quality.doubts]
+    if not doubtful:
+        return False
+    moving = sum(len(picked) for one in found for picked in one.picked.values())
+    if moving <= MOST_MOVING * sum(len(frame.rows) for frame in window):
+        return False
+    log.warning(
+        "nothing is called moving around frame %d: its pose is doubtful, and too much would be",
+        doubtful[0],
+    )
+    return True

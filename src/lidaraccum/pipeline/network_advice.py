@@ -1,0 +1,95 @@
+"""The network's proposals to the stream: frames encoded once, looked at together, not believed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidaraccum.geometry.clustering import dense_groups
+from lidaraccum.model.reading import FrameReading
+from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.motion_settings import MotionSettings
+from lidaraccum.pipeline.object_ids import ObjectIds
+from lidaraccum.pipeline.painting import Canvas
+from lidaraccum.pipeline.still_objects import StillObjects
+from lidaraccum.pipeline.suspects import Lead
+from lidaraccum.pipeline.tubes import CELL_M, NEIGHBOURS, RADIUS_M, Reader, Tube, find_tubes
+
+SPAN = 5
+"""Frames that the network looks at together: the windows it learned on, the first the target."""
+
+MOVABLE_ABOVE = 0.5
+"""Points whose probability of being on something movable is higher are."""
+
+STILL_POINTS = 10
+"""What stands has so many points in a frame, low ones among them."""
+
+
+class NetworkAdvice:
+    """Proposes what the network takes for moving; names what it takes for movable and stands."""
+
+    def __init__(self, reader: Reader, settings: MotionSettings, ids: ObjectIds) -> None:
+        self._reader = reader
+        self._settings = settings
+        self._still = StillObjects(ids)
+        self._encoded: dict[int, object] = {}
+        self._readings: dict[int, FrameReading] = {}
+        self._tubes: list[Tube] = []
+        self._next_unread = 0
+
+    def see(self, frame: SightedFrame) -> None:
+        """Encode the frame."""
+        self._encoded[frame.index] = self._reader.read(frame.registered.frame)
+
+    def leads(self, window: Sequence[SightedFrame]) -> list[Lead]:
+        """What the network sees moving, where the window shows it, the largest first."""
+        for run in self._unread_runs(window):
+            encoded = [self._encoded[frame.index] for frame in run]
+            poses = np.stack([frame.world_from_sensor for frame in run])
+            reading = self._reader.look(encoded, poses, 0)
+            for frame, one in zip(run, reading.frames, strict=True):
+                self._readings[frame.index] = one
+            self._tubes += find_tubes(run, reading, self._reader, self._settings)
+        self._next_unread = window[-1].index + 1
+        recent = {frame.index for frame in window[-SPAN:]}
+        self._encoded = {index: one for index, one in self._encoded.items() if index in recent}
+        shown = {frame.index for frame in window}
+        self._tubes = [tube for tube in self._tubes if shown & tube.picked.keys()]
+        leads = [tube.lead(window) for tube in self._tubes]
+        return sorted((one for one in leads if one), key=lambda lead: -len(lead.suspect))
+
+    def name_still(self, frame: SightedFrame, canvas: Canvas) -> None:
+        """Movable points that no mover has become objects that stand."""
+        reading = self._readings.pop(frame.index, None)
+        if reading is None:
+            return
+        rows = np.concatenate([frame.rows, frame.low_rows])
+        level = frame.world_of_near()[:, :2]
+        self._follow_movers(rows, level, canvas)
+        free = (reading.foreground[rows] > MOVABLE_ABOVE) & (canvas.instances(rows) == 0)
+        rows, level = rows[free], level[free]
+        cluster = dense_groups(level + reading.offset[rows], CELL_M, RADIUS_M, NEIGHBOURS)
+        counts = np.bincount(cluster[cluster >= 0], minlength=1)
+        groups = [np.flatnonzero(cluster == one) for one in np.flatnonzero(counts >= STILL_POINTS)]
+        names = self._still.name([level[group] for group in groups])
+        for name, group in zip(names, groups, strict=True):
+            canvas.paint_still(rows[group], name, reading.foreground[rows[group]])
+
+    def _unread_runs(self, window: Sequence[SightedFrame]) -> Iterator[list[SightedFrame]]:
+        """Runs of frames that cover all that was not looked at, each from the one before on."""
+        unread = next(
+            (p for p, frame in enumerate(window) if frame.index >= self._next_unread), len(window)
+        )
+        while unread < len(window):
+            first = max(0, min(unread - 1, len(window) - SPAN))
+            yield list(window[first : first + SPAN])
+            unread = first + SPAN
+
+    def _follow_movers(
+        self, rows: NDArray[np.int64], level: NDArray[np.float64], canvas: Canvas
+    ) -> None:
+        instances = canvas.instances(rows)
+        for instance in np.unique(instances[instances > 0]).tolist():
+            self._still.follow(instance, level[instances == instance])

@@ -1,0 +1,32 @@
+"""Movers and movables proposed by the network, verified by geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from lidaraccum.data.perceived import PerceivedFrame
+from lidaraccum.data.registered import RegisteredFrame
+from lidaraccum.pipeline.motion_settings import BALANCED, MotionSettings
+from lidaraccum.pipeline.mover_stream import MoverStream
+from lidaraccum.pipeline.network_advice import NetworkAdvice
+from lidaraccum.pipeline.object_ids import ObjectIds
+from lidaraccum.pipeline.tubes import Reader
+
+
+class NetworkLed:
+    """As `LabelFree`, and the network points out what may move and what could.
+
+    Every mover it proposes must explain the points better than standing still, as must what free
+    space raises suspicion of: a wrong network costs time. What it takes for movable and does not
+    move is labelled still, on its word alone; that moves no point.
+    """
+
+    def __init__(self, reader: Reader, settings: MotionSettings = BALANCED) -> None:
+        self._reader = reader
+        self._settings = settings
+
+    def perceive(self, frames: Iterable[RegisteredFrame]) -> Iterator[PerceivedFrame]:
+        """Each frame once, in order, its movers labelled and placed, what stands named."""
+        ids = ObjectIds()
+        advice = NetworkAdvice(self._reader, self._settings, ids)
+        return MoverStream(self._settings, advice, ids).run(frames)

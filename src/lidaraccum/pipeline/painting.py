@@ -1,0 +1,159 @@
+"""One frame's answer put together: which points are whose, and where each mover is."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from lidaraccum.data.accumulation import BACKGROUND, MOVING, STILL
+from lidaraccum.data.perceived import PerceivedFrame
+from lidaraccum.geometry import rigid
+from lidaraccum.pipeline.association import Track
+from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.shape import ObjectShape
+
+LOW_REACH_M = 0.2
+"""Low points this near to a mover's obstacles, seen from above, are its wheels and shoes."""
+
+LOST_FRAMES = 3
+FOUND_M = 0.25
+FOUND_SHARE = 0.5
+"""A mover that no window saw is looked for where it should be, in so many frames; there it is when
+so many points, against its last, lie this near to its shape."""
+
+
+_NONE = np.zeros(0, dtype=np.int64)
+
+
+class Canvas:
+    """One frame's answer while it is put together."""
+
+    def __init__(self, frame: SightedFrame) -> None:
+        count = len(frame.registered.frame)
+        self._frame = frame
+        self._label = np.full(count, BACKGROUND, dtype=np.uint8)
+        self._instance = np.zeros(count, dtype=np.int32)
+        self._confidence = np.zeros(count, dtype=np.float32)
+        self._confidence[frame.rows] = np.where(
+            frame.through > frame.met, 0.5, 1.0 - 0.5 / (1.0 + frame.met)
+        )
+        self._poses: dict[int, rigid.Pose] = {}
+
+    def free(self, picked: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Those of the picked obstacles (K,) that are no other object's."""
+        return picked[self._instance[self._frame.rows[picked]] == 0]
+
+    def paint(self, track: Track, picked: NDArray[np.int64], label: int) -> None:
+        """Give obstacles (K,), and what is low beside them, to an object."""
+        rows = np.concatenate([self._frame.rows[picked], self._low_beside(picked)])
+        rows = rows[self._instance[rows] == 0]
+        self._label[rows] = label
+        self._instance[rows] = track.instance
+        self._confidence[rows] = min(1.0, 0.5 + 0.5 * track.margin)
+        if label == MOVING:
+            self._poses[track.instance] = track.world_from_object
+
+    def paint_still(
+        self, rows: NDArray[np.int64], instance: int, confidence: NDArray[np.float32]
+    ) -> None:
+        """Give rows (K,) of the frame to something movable that stands, as sure as (K,) 0..1."""
+        self._label[rows] = STILL
+        self._instance[rows] = instance
+        self._confidence[rows] = confidence
+
+    def instances(self, rows: NDArray[np.int64]) -> NDArray[np.int32]:
+        """The objects (K,) of rows (K,) of the frame, 0 for none so far."""
+        return self._instance[rows]
+
+    def perceived(self) -> PerceivedFrame:
+        """The answer."""
+        return PerceivedFrame(
+            registered=self._frame.registered,
+            label=self._label,
+            instance=self._instance,
+            confidence=self._confidence,
+            world_from_object=self._poses,
+        )
+
+    def _low_beside(self, picked: NDArray[np.int64]) -> NDArray[np.int64]:
+        frame = self._frame
+        if len(frame.low_rows) == 0:
+            return frame.low_rows
+        low = frame.near_points[len(frame.rows) :, :2]
+        distance, _ = cKDTree(frame.points[picked, :2]).query(low, distance_upper_bound=LOW_REACH_M)
+        return frame.low_rows[np.isfinite(distance)]
+
+
+def paint_mover(track: Track, frame: SightedFrame, canvas: Canvas, box_growth: float) -> None:
+    """Give a mover its points of a frame, from windows or, for a while, from its shape alone."""
+    picked = canvas.free(track.picked.get(frame.index, _NONE))
+    if len(picked):
+        _follow(track, frame, picked)
+        canvas.paint(
+            track, np.union1d(picked, canvas.free(_in_box(track, frame, box_growth))), MOVING
+        )
+        return
+    if track.shape is None or frame.index - track.last_index > LOST_FRAMES:
+        return
+    seconds = frame.stamp - track.last_stamp
+    ahead = rigid.translation(track.velocity * seconds) @ track.world_from_object
+    gone_on = canvas.free(_near_shape(track.shape, ahead, frame))
+    stayed = canvas.free(_near_shape(track.shape, track.world_from_object, frame))
+    label, near, pose = STILL, stayed, track.world_from_object
+    if len(gone_on) > len(stayed):
+        label, near, pose = MOVING, gone_on, ahead
+    if len(near) > FOUND_SHARE * track.points:
+        _settle(track, frame, near, pose)
+        canvas.paint(track, near, label)
+
+
+def _follow(track: Track, frame: SightedFrame, picked: NDArray[np.int64]) -> None:
+    """Place a mover in a frame: predicted from the last, then fitted to its shape."""
+    world = frame.world(picked)
+    velocity = track.velocities[frame.index]
+    if track.shape is None:
+        pose = rigid.translation(world.mean(axis=0))
+        heading = float(np.arctan2(velocity[1], velocity[0]))
+        cosine, sine = np.cos(heading), np.sin(heading)
+        pose[:2, :2] = [[cosine, -sine], [sine, cosine]]
+        track.shape = ObjectShape(rigid.transform(rigid.invert(pose), world))
+    else:
+        shift = velocity * (frame.stamp - track.last_stamp)
+        pose = rigid.translation(shift) @ track.world_from_object
+        own = rigid.transform(rigid.invert(pose), world)
+        fit = track.shape.fit(own)
+        pose = pose @ rigid.invert(fit.correction)
+        track.shape.add(rigid.transform(fit.correction, own))
+    _note(track, frame, pose, len(picked))
+
+
+def _settle(track: Track, frame: SightedFrame, picked: NDArray[np.int64], pose: rigid.Pose) -> None:
+    """Place a mover that no window saw in a frame, by its shape alone."""
+    assert track.shape is not None
+    own = rigid.transform(rigid.invert(pose), frame.world(picked))
+    pose = pose @ rigid.invert(track.shape.fit(own).correction)
+    _note(track, frame, pose, len(picked))
+
+
+def _note(track: Track, frame: SightedFrame, pose: rigid.Pose, points: int) -> None:
+    track.world_from_object = pose
+    track.last_index, track.last_stamp = frame.index, frame.stamp
+    track.points = points
+
+
+def _in_box(track: Track, frame: SightedFrame, growth: float) -> NDArray[np.int64]:
+    """The frame's obstacles (K,) within the mover's box, where nothing else can be.
+
+    None at all when they would outnumber those known to be its own: then the box is wrong.
+    """
+    assert track.shape is not None
+    object_from_sensor = rigid.invert(track.world_from_object) @ frame.world_from_sensor
+    inside = track.shape.holds(rigid.transform(object_from_sensor, frame.points))
+    return np.flatnonzero(inside) if inside.sum() < growth * track.points else _NONE
+
+
+def _near_shape(shape: ObjectShape, pose: rigid.Pose, frame: SightedFrame) -> NDArray[np.int64]:
+    """The frame's obstacles (K,) on a shape at a pose."""
+    own = rigid.transform(rigid.invert(pose) @ frame.world_from_sensor, frame.points)
+    return np.flatnonzero(np.isfinite(shape.distances(own, FOUND_M)))

@@ -1,0 +1,192 @@
+"""What the network takes for one mover: its points in all frames of a window, and its motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidaraccum.data.frame import Frame
+from lidaraccum.geometry import rigid
+from lidaraccum.geometry.clustering import dense_groups
+from lidaraccum.model.reading import ObjectReading, WindowReading
+from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.motion_settings import MotionSettings
+from lidaraccum.pipeline.suspects import Lead, Suspect
+
+MOVING_ABOVE = 0.5
+"""Points whose probability of moving is higher are part of a proposed mover."""
+
+CELL_M = 0.1
+RADIUS_M = 0.4
+NEIGHBOURS = 5
+"""DBSCAN of points at the centres they point to, seen from above; METHOD.md section 4. Many points
+to one centre make one cell."""
+
+LONGEST_M = 25.0
+"""Nothing on a road is longer."""
+
+MOST_TUBES = 60
+"""So many movers a window are proposed at most, the largest: weights that take everything for
+moving cost time, but not without end."""
+
+
+class Reader(Protocol):
+    """The network, as far as the pipeline knows it: `lidaraccum.model.reader.NetworkReader`."""
+
+    def read(self, frame: Frame) -> object:
+        """A frame as the network keeps it."""
+
+    def look(
+        self, encoded: Sequence[object], world_from_sensor: NDArray[np.float64], target: int
+    ) -> WindowReading:
+        """What T frames, as kept, with poses (T, 4, 4) say together."""
+
+    def track(
+        self, reading: WindowReading, instances: Sequence[NDArray[np.int64]]
+    ) -> ObjectReading:
+        """Motions of objects named point by point, 0 for none, in each of the T frames."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tube:
+    """A mover as the network proposes it.
+
+    Attributes:
+        picked: By frame index in the sequence: which of that frame's obstacles (K,).
+        velocities: (H, 3) m/s, world, level: how it may move.
+        trust: Mean probability that its points move.
+    """
+
+    picked: Mapping[int, NDArray[np.int64]]
+    velocities: NDArray[np.float64]
+    trust: float
+
+    def lead(self, window: Sequence[SightedFrame]) -> Lead | None:
+        """The tube's fullest frame in a window as a proposal; None where no frame is in it."""
+        shown = [place for place, frame in enumerate(window) if frame.index in self.picked]
+        if not shown:
+            return None
+        place = max(shown, key=lambda place: len(self.picked[window[place].index]))
+        picked = self.picked[window[place].index]
+        suspect = Suspect(place, picked, window[place].world(picked).mean(axis=0))
+        return Lead(suspect, self.velocities, self.trust)
+
+
+def find_tubes(
+    frames: Sequence[SightedFrame],
+    reading: WindowReading,
+    reader: Reader,
+    settings: MotionSettings,
+) -> list[Tube]:
+    """The movers that the network sees in frames it has looked at together, the largest first."""
+    groups = _groups(frames, reading, settings)
+    if not groups:
+        return []
+    instances = [np.zeros(len(one.foreground), dtype=np.int64) for one in reading.frames]
+    for number, group in enumerate(groups, start=1):
+        for place, picked in group.items():
+            instances[place][frames[place].rows[picked]] = number
+    motions = reader.track(reading, instances)
+    tubes = []
+    for number, group in enumerate(groups, start=1):
+        velocities = [_centroid_velocity(group, frames)]
+        velocities += _regressed_velocities(number, group, frames, reading, motions)
+        fast = np.array([one for one in velocities if np.isfinite(one).all()]).reshape(-1, 3)
+        sure = [
+            reading.frames[place].dynamic[frames[place].rows[picked]]
+            for place, picked in group.items()
+        ]
+        tubes.append(
+            Tube(
+                {frames[place].index: picked for place, picked in group.items()},
+                fast,
+                float(np.concatenate(sure).mean()),
+            )
+        )
+    return tubes
+
+
+_Group = dict[int, NDArray[np.int64]]
+"""By place in the window: obstacles (K,) of one proposed mover."""
+
+
+def _groups(
+    frames: Sequence[SightedFrame], reading: WindowReading, settings: MotionSettings
+) -> list[_Group]:
+    """Obstacles that point to one centre, whatever they are."""
+    picked, centres, ends = [], [], []
+    for frame, one in zip(frames, reading.frames, strict=True):
+        moving = np.flatnonzero(one.dynamic[frame.rows] > MOVING_ABOVE)
+        picked.append(moving)
+        centres.append(frame.world(moving)[:, :2] + one.offset[frame.rows[moving]])
+        ends.append(len(moving))
+    place = np.repeat(np.arange(len(frames)), ends)
+    obstacle = np.concatenate(picked)
+    cluster = dense_groups(np.concatenate(centres), CELL_M, RADIUS_M, NEIGHBOURS)
+    groups: list[_Group] = []
+    for number in range(int(cluster.max(initial=-1)) + 1):
+        own = cluster == number
+        group = {int(at): obstacle[own & (place == at)] for at in np.unique(place[own]).tolist()}
+        most = max(len(rows) for rows in group.values())
+        if most >= settings.min_points and _extent(group, frames) < LONGEST_M:
+            groups.append(group)
+    groups.sort(key=lambda group: -sum(map(len, group.values())))
+    return groups[:MOST_TUBES]
+
+
+def _extent(group: _Group, frames: Sequence[SightedFrame]) -> float:
+    """The largest side, metres, of the group in the frame that shows most of it."""
+    place = max(group, key=lambda place: len(group[place]))
+    return float(np.ptp(frames[place].points[group[place], :2], axis=0).max())
+
+
+def _centroid_velocity(group: _Group, frames: Sequence[SightedFrame]) -> NDArray[np.float64]:
+    """Velocity (3,) at which the points' centre goes from frame to frame; NaN in one alone."""
+    weight = np.array([float(len(picked)) for picked in group.values()])
+    seconds = np.array([frames[place].stamp for place in group])
+    centres = np.array([frames[place].world(rows).mean(axis=0) for place, rows in group.items()])
+    seconds = seconds - np.average(seconds, weights=weight)
+    spread = (weight * seconds**2).sum()
+    if spread <= 0:
+        return np.full(3, np.nan)
+    return ((weight * seconds) @ centres / spread) * (1.0, 1.0, 0.0)
+
+
+def _regressed_velocities(
+    number: int,
+    group: _Group,
+    frames: Sequence[SightedFrame],
+    reading: WindowReading,
+    motions: ObjectReading,
+) -> list[NDArray[np.float64]]:
+    """Velocities (3,) by TubeNet's motions: one for all frames, one for the farthest in time."""
+    rows = np.flatnonzero(motions.ids == number)
+    if len(rows) == 0:
+        return []
+    row = int(rows[0])
+    world_from_target = frames[reading.target].world_from_sensor
+    anchor = frames[int(motions.anchor[row])].stamp
+    shifts, seconds, weight = [], [], []
+    for place, picked in group.items():
+        lag = anchor - frames[place].stamp
+        if lag == 0 or not motions.seen[row, place]:
+            continue
+        anchor_from_now = (
+            world_from_target
+            @ motions.target_from_aligned[row, place]
+            @ frames[reading.target].sensor_from_world
+        )
+        centre = frames[place].world(picked).mean(axis=0, keepdims=True)
+        shifts.append((rigid.transform(anchor_from_now, centre) - centre)[0])
+        seconds.append(lag)
+        weight.append(len(picked))
+    if not shifts:
+        return []
+    shift, lags = np.array(shifts) * (1.0, 1.0, 0.0), np.array(seconds)
+    weights = np.array(weight) * lags
+    farthest = int(np.abs(lags).argmax())
+    return [weights @ shift / (weights @ lags), shift[farthest] / lags[farthest]]
