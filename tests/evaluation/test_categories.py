@@ -28,6 +28,13 @@ from lidaraccum.evaluation.categories import (
         ("Pedestrian", PEDESTRIAN),
         ("Cyclist", WHEELED),
         ("MOTORCYCLE", WHEELED),
+        ("regular_vehicle", CAR),
+        ("vehicular_trailer", OTHER_VEHICLE),
+        ("construction", OTHER_VEHICLE),
+        ("pedestrian.adult", PEDESTRIAN),
+        ("official_signaler", PEDESTRIAN),
+        ("dog", PEDESTRIAN),
+        ("wheeled_rider", WHEELED),
         ("something else", OTHER_VEHICLE),
     ],
 )

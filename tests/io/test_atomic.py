@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from lidaraccum.errors import OutputError, OutputExistsError
+from lidaraccum.errors import MissingInputError, OutputError, OutputExistsError
 from lidaraccum.io.atomic import atomic, write_json
 
 
@@ -33,6 +33,16 @@ def test_an_exception_leaves_what_was_there(tmp_path: Path) -> None:
         interrupted()
     assert path.read_text() == "old"
     assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_what_went_wrong_with_an_input_keeps_its_own_words(tmp_path: Path) -> None:
+    def unreadable() -> None:
+        with atomic(tmp_path / "a.txt"):
+            raise MissingInputError("sweep 7 does not exist")
+
+    with pytest.raises(MissingInputError, match=r"^sweep 7 does not exist$"):
+        unreadable()
+    assert not list(tmp_path.iterdir())
 
 
 def test_json_is_refused_or_replaced(tmp_path: Path) -> None:

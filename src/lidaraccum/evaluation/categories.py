@@ -13,9 +13,28 @@ CATEGORIES = ("background", "car", "other vehicle", "pedestrian", "wheeled")
 BACKGROUND, CAR, OTHER_VEHICLE, PEDESTRIAN, WHEELED = range(len(CATEGORIES))
 
 _WORDS = {
-    CAR: ("car", "vehicle"),
-    PEDESTRIAN: ("pedestrian", "person", "child", "adult", "worker", "stroller"),
-    WHEELED: ("cyclist", "bicycl", "motorcycl", "bike", "scooter", "rider", "wheelchair"),
+    CAR: ("car", "vehicle", "regular_vehicle"),
+    PEDESTRIAN: (
+        "pedestrian",
+        "person",
+        "child",
+        "adult",
+        "worker",
+        "stroller",
+        "official_signaler",
+        "animal",
+        "dog",
+    ),
+    WHEELED: (
+        "cyclist",
+        "bicycl",
+        "motorcycl",
+        "bike",
+        "scooter",
+        "rider",
+        "wheelchair",
+        "wheeled",
+    ),
 }
 
 

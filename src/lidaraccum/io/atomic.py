@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from lidaraccum.errors import OutputError, OutputExistsError
+from lidaraccum.errors import LidarAccumError, OutputError, OutputExistsError
 
 
 def check_free(path: Path, overwrite: bool) -> None:
@@ -78,7 +78,8 @@ def writable(path: Path) -> Iterator[None]:
     """Turns what the system says about an output (disk full, no permission) into `OutputError`."""
     try:
         yield
-    except (OutputError, OutputExistsError):
+    except LidarAccumError:
+        # Also what went wrong with an input that was read meanwhile: some of them are OSErrors.
         raise
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror or error}") from error

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lidaraccum.errors import InputError, MissingDependencyError
 from lidaraccum.io.columns import readable
 
-INSTALL = "pip install 'lidaraccum[convert]', or pip install pyarrow"
+INSTALL = "pip install 'pyarrow>=14', or this package with its extra 'convert'"
 
 Record = TypeVar("Record")
 Table = Mapping[str, NDArray[Any]]
@@ -54,9 +54,10 @@ def read_records(
             raise
         except ValueError as error:
             raise InputError(f"{path} is not JSON: {error}") from error
-    if not isinstance(records, list):
+    kept = [one for one in records if one is not None] if isinstance(records, list) else None
+    if kept is None or not all(isinstance(record, kind) for record in kept):
         raise InputError(f"{path} is not a list of records")
-    return [record for record in records if record is not None]
+    return kept
 
 
 def read_feather(path: Path, columns: Sequence[str]) -> Table:

@@ -72,7 +72,7 @@ THINGS = (
         (0.8, 0.8, 1.8),
         (12.0, 2.5, 1.0),
         velocity=(0.0, 1.4),
-        drawn_from=0.3,
+        drawn_from=0.2,
     ),
     Thing(
         "sign",
@@ -99,6 +99,11 @@ class Cast:
     row: np.ndarray
     column: np.ndarray
     distance: np.ndarray
+
+    @property
+    def in_no_label_zone(self) -> np.ndarray:
+        """(N,) bool: in the quarter of the sweep from the right to behind."""
+        return self.column > COLUMNS * 3 // 4
 
     def seen_from(self, world_from_frame: np.ndarray) -> np.ndarray:
         """Points (N, 3) in a frame's coordinates."""

@@ -37,9 +37,9 @@ def write_waymo(root: Path, name: str = "10023947602400723454_1120_000_1140_000"
             "key.frame_timestamp_micros": EPOCH_S * 1_000_000 + round(1e6 * time),
         }
         image = np.full((ROWS, COLUMNS, 4), -1.0, dtype="f4")
-        ahead = np.arange(COLUMNS)[made.column] > COLUMNS * 3 // 4
         image[made.row, made.column] = np.stack(
-            [made.distance, made.row, made.column % 2, np.where(ahead, 1.0, -1.0)], axis=1
+            [made.distance, made.row, made.column % 2, np.where(made.in_no_label_zone, 1.0, -1.0)],
+            axis=1,
         )
         second = np.full_like(image, -1.0)
         second[5, 7] = [30.0, 2.0, 0.5, -1.0]
