@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,10 +83,11 @@ def score_network(network: Network, batches: Iterable[Batch]) -> Scores:
     with torch.no_grad():
         answers = [score_stages(network, batch) for batch in batches]
     network.train(was_training)
-    return _pool(answers)
+    return scores_of(answers)
 
 
-def _pool(answers: list[StageScores]) -> Scores:
+def scores_of(answers: Sequence[StageScores]) -> Scores:
+    """Scores of any number of windows together."""
     alone = EndToEnd.pool(answer.alone for answer in answers)
     static, dynamic = alone.flow.static, alone.flow.dynamic
     foreground = SegmentationCounts.pool(answer.foreground for answer in answers)

@@ -1,0 +1,94 @@
+"""Scores weights on the simulator's test set, the network doing all of it itself.
+
+Usage: score_weights.py WEIGHTS [--windows 40] [--extent 64] [--threads 2]
+
+Prints two Markdown tables: the whole network beside the paper's figures (its own poses, masks,
+objects and motions; five frames, the first the target, ground included, sweeps compensated), and
+each stage given the truth of those before it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import torch
+from tqdm import tqdm
+
+from lidaraccum.evaluation import paper
+from lidaraccum.evaluation.scores import Scores as EvaluationScores
+from lidaraccum.evaluation.table import Row, row_of
+from lidaraccum.metrics.segmentation import SegmentationCounts
+from lidaraccum.model.checkpoint import load_network
+from lidaraccum.model.settings import NetworkSettings
+from lidaraccum.simulation.drive import simulate
+from lidaraccum.simulation.windows import TEST_WINDOWS, held_out_settings
+from lidaraccum.training.end_to_end import EndToEnd
+from lidaraccum.training.scores import scores_of
+from lidaraccum.training.stages import StageScores, score_stages
+from lidaraccum.training.truth import make_window
+from lidaraccum.training.window import Batch, make_batch
+
+STAGES = (
+    "foreground_iou", "motion_iou", "ego_epe_m", "ego_epe_median_m", "offset_m", "object_epe_m",
+    "object_still_m",
+)  # fmt: skip
+
+
+def test_windows(count: int, extent_m: float, settings: NetworkSettings) -> Iterator[Batch]:
+    """Windows spread evenly over the test set."""
+    for number in range(count):
+        drawn = replace(held_out_settings(number * TEST_WINDOWS // count), compensated=True)
+        drive = simulate(drawn)
+        frames = [(drive[index], drive.labels(index)) for index in range(len(drive))]
+        yield make_batch([make_window(frames, 0, settings, extent_m)])
+
+
+def whole_row(name: str, parts: list[StageScores]) -> Row:
+    """The line of the network alone."""
+    alone = EndToEnd.pool(part.alone for part in parts)
+    scores = EvaluationScores(
+        windows=len(parts),
+        flow=alone.flow,
+        motion=alone.motion,
+        foreground=SegmentationCounts.pool(part.foreground for part in parts),
+        association=alone.association,
+        moving_association=alone.moving,
+    )
+    return replace(row_of(name, scores), seconds=float("nan"))
+
+
+def tell(titles: list[str], rows: list[list[str]]) -> None:
+    """A Markdown table."""
+    for cells in (titles, ["---"] * len(titles), *rows):
+        print(f"| {' | '.join(cells)} |")
+
+
+def main() -> None:
+    """Parse, score, print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("weights", type=Path)
+    parser.add_argument("--windows", type=int, default=40)
+    parser.add_argument("--extent", type=float, default=64.0)
+    parser.add_argument("--threads", type=int, default=2)
+    options = parser.parse_args()
+    torch.set_num_threads(options.threads)
+    network = load_network(options.weights)
+    batches = test_windows(options.windows, options.extent, network.settings)
+    began = time.monotonic()
+    with torch.no_grad():
+        parts = [score_stages(network, batch) for batch in tqdm(batches, total=options.windows)]
+    print(
+        f"{len(parts)} test windows, {options.extent:g} m grid, {time.monotonic() - began:.0f} s\n"
+    )
+    tell(Row.titles(), [whole_row("network alone", parts).cells(), paper.WAYMO.cells()])
+    stages = asdict(scores_of(parts))
+    print("\nEach stage given the truth of those before it:\n")
+    tell(list(STAGES), [[f"{stages[name]:.3f}" for name in STAGES]])
+
+
+if __name__ == "__main__":
+    main()
