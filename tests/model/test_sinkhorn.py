@@ -5,7 +5,11 @@ from __future__ import annotations
 import pytest
 import torch
 
-from lidaraccum.model.sinkhorn import sinkhorn
+from lidaraccum.model.sinkhorn import sinkhorn as soft_matches
+
+
+def sinkhorn(affinity: torch.Tensor, rounds: int) -> torch.Tensor:
+    return soft_matches(affinity, rounds).dense()
 
 
 def by_logarithms(affinity: torch.Tensor, rounds: int) -> torch.Tensor:
@@ -65,3 +69,11 @@ def test_the_gradient_survives_impossible_pairs() -> None:
     sinkhorn(affinity, 5).sum().backward()
     assert affinity.grad is not None
     assert torch.isfinite(affinity.grad).all()
+
+
+def test_what_is_carried_is_the_sum_over_the_matches() -> None:
+    affinity = random_affinity(3.0)
+    values = torch.arange(2 * 9 * 4).view(2, 9, 4).double()
+    matches = soft_matches(affinity, 5)
+    torch.testing.assert_close(matches.carry(values), matches.dense() @ values)
+    torch.testing.assert_close(matches.column_mass(), matches.dense().sum(dim=1))

@@ -15,9 +15,10 @@ import torch
 
 from lidaraccum.errors import OutputExistsError, SettingsError
 from lidaraccum.model.checkpoint import load_network, read_tensors
+from lidaraccum.model.network import build_network
 from lidaraccum.training.settings import OptimiserSettings, TrainSettings
 from lidaraccum.training.state import METRICS_FILE, STATE_FILE, WEIGHTS_FILE
-from lidaraccum.training.trainer import learning_rate, train
+from lidaraccum.training.trainer import clip_gradients, learning_rate, train
 
 
 def settings_of(toy: ModuleType, steps: int) -> TrainSettings:
@@ -120,11 +121,24 @@ def test_fine_tuning_starts_from_the_weights_given(toy: ModuleType, tmp_path: Pa
 
 def test_the_rate_rises_then_falls() -> None:
     settings = OptimiserSettings(rate=1.0, warmup_steps=10, epoch_steps=100)
-    rates = [learning_rate(settings, step, None) for step in (0, 9, 100, 200)]
+    rates = [learning_rate(settings, step, 0.0) for step in (0, 9, 100, 200)]
     assert rates == pytest.approx([0.1, 0.98**0.09, 0.98, 0.98**2])
     cosine = replace(settings, schedule="cosine")
-    ends = [learning_rate(cosine, step, 1000) for step in (10, 500, 1000)]
+    ends = [learning_rate(cosine, step, step / 1000) for step in (10, 500, 1000)]
     assert ends == pytest.approx([1.0, 0.505, 0.01], abs=1e-3)
+
+
+def test_each_part_learns_although_another_shouts(toy: ModuleType, tmp_path: Path) -> None:
+    """The longest gradient of all must not decide how far every other part of it goes."""
+    network = build_network(toy.SMALL)
+    for name, parameter in network.named_parameters():
+        parameter.grad = torch.full_like(parameter, 1e6 if name.startswith("tube_net") else 1e-3)
+    before = network.backbone.stem.weight.grad.clone()
+    assert clip_gradients(network, 5.0)
+    torch.testing.assert_close(network.backbone.stem.weight.grad, before)
+    assert torch.linalg.vector_norm(network.tube_net.last.weight.grad) <= 5.0
+    network.tube_net.last.bias.grad[0] = torch.nan
+    assert not clip_gradients(network, 5.0)
 
 
 def test_training_needs_an_end() -> None:

@@ -8,7 +8,7 @@ import torch
 from torch import nn
 
 from lidaraccum.model.batch import FrameTensors
-from lidaraccum.model.kabsch import exactly, fit_rigid, invert
+from lidaraccum.model.kabsch import exactly, fit_rigid, invert, move
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.model.sinkhorn import sinkhorn
 
@@ -16,6 +16,11 @@ SHARP_START = -5.0
 """Where offset and scale of the affinity start; a soft start does not learn."""
 SHARPEST = 0.02
 _LEAST_REACH_M = 1.0
+STANDING_M = 0.3
+"""Pillars whose points lie this high above ground, on average, stand out of it."""
+STANDING_ODDS = 16.0
+"""How much rather such a pillar is chosen: the road looks alike everywhere and says only its
+height, but there is far more of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +71,8 @@ class EgoMatch:
         column_mass: (B, N) 0..1, of target pillars.
         source_valid: (B, N) bool.
         target_valid: (B, N) bool.
+        rounds: The motion between level coordinates after each round of matching, the last one's
+            being the answer.
     """
 
     target_from_source: torch.Tensor
@@ -75,6 +82,7 @@ class EgoMatch:
     column_mass: torch.Tensor
     source_valid: torch.Tensor
     target_valid: torch.Tensor
+    rounds: tuple[torch.Tensor, ...]
 
 
 class EgoHead(nn.Module):
@@ -112,7 +120,7 @@ def _patches(base: torch.Tensor, frame: torch.Tensor, cell: torch.Tensor) -> tor
 def choose_background(
     frames: FrameTensors, foreground: torch.Tensor, count: int, seed: int
 ) -> tuple[torch.Tensor, torch.Tensor]:
-    """Pick pillars of each frame at random, background first: indices and validity (F, count).
+    """Draw pillars of each frame, background first: indices and validity (F, count).
 
     Args:
         frames: F frames with V pillars.
@@ -124,7 +132,9 @@ def choose_background(
     owner = frames.pillar_frame
     points = torch.tensor(frames.point_counts, device=owner.device)
     key = _hash(frames.pillar_cell + 65536 * 7 * points[owner] + 1_000_003 * seed)
-    key = key + (foreground > 0) + 2.0 * owner  # background below 1, foreground above, by frame
+    odds = torch.where(frames.pillar_height > STANDING_M, STANDING_ODDS, 1.0)
+    key = key ** (1.0 / odds)  # drawn by odds without putting back (Efraimidis and Spirakis, 2006)
+    key = (1.0 - key) + (foreground > 0) + 2.0 * owner  # background below 1, foreground above
     order = torch.argsort(key)
     starts = torch.tensor((0, *frames.pillar_counts[:-1]), device=owner.device).cumsum(0)
     rank = torch.arange(len(order), device=owner.device) - starts[owner]
@@ -149,43 +159,72 @@ def _hash(number: torch.Tensor) -> torch.Tensor:
 class Matcher(nn.Module):
     """Soft matches between the background pillars of two frames, and the motion they say.
 
-    Source: the paper, section 3.2 and supplement; the affinity's form from METHOD.md.
+    Ours: matched again, a few times, about where the motion so far puts the pillars, within less
+    and less reach. Few of the pillars drawn in one frame are drawn in the other too; at first a
+    pillar may have its partner far away, in the end only next to it.
+
+    Source: the paper, section 3.2 and supplement; the affinity's form from METHOD.md; matching in
+    rounds as RPM-Net (Yew and Lee, CVPR 2020).
     """
 
     def __init__(self, settings: NetworkSettings) -> None:
         super().__init__()
-        self.offset = nn.Parameter(torch.tensor(SHARP_START))
-        self.scale = nn.Parameter(torch.tensor(SHARP_START))
-        self.rounds = settings.sinkhorn_rounds
+        rounds = 1 + len(settings.rematch_m)
+        self.offset = nn.Parameter(torch.full((rounds,), SHARP_START))
+        self.scale = nn.Parameter(torch.full((rounds,), SHARP_START))
+        self.rematch_m = settings.rematch_m
+        self.sinkhorn_rounds = settings.sinkhorn_rounds
         self.fastest_mps = settings.fastest_mps
 
     def forward(self, source: EgoPillars, target: EgoPillars, gap_s: torch.Tensor) -> EgoMatch:
         """Motions between B pairs of frames, ``gap_s`` (B,) seconds apart; float32 throughout."""
         with exactly(source.position):
-            matches = sinkhorn(self._affinity(source, target, gap_s), self.rounds)
-            row_mass = matches.sum(dim=2)
-            partner = matches @ target.position / row_mass.clamp_min(1e-6)[..., None]
-            motion = fit_rigid(source.position, partner, row_mass)
+            impossible = ~(source.valid[:, :, None] & target.valid[:, None, :])
+            reach = (self.fastest_mps * gap_s.abs()).clamp_min(_LEAST_REACH_M)
+            apart = torch.cdist(source.position[..., :2], target.position[..., :2])
+            near = torch.zeros_like(apart).masked_fill_(
+                impossible | (apart > reach[:, None, None]), -torch.inf
+            )
+            motion, row_mass, column_mass = self._fit(source, target, near, 0)
+            rounds = [motion]
+            for number, near_m in enumerate(self.rematch_m, start=1):
+                placed = move(motion.detach(), source.position)
+                apart = torch.cdist(placed, target.position)
+                # A normal distribution, cut off at two sigmas.
+                near = (-2.0 * (apart / near_m) ** 2).masked_fill_(
+                    impossible | (apart > near_m), -torch.inf
+                )
+                motion, row_mass, column_mass = self._fit(source, target, near, number)
+                rounds.append(motion)
             sensor = invert(target.level_from_sensor) @ motion @ source.level_from_sensor
         return EgoMatch(
             target_from_source=sensor,
             level_target_from_source=motion,
             source=source.position,
             row_mass=row_mass,
-            column_mass=matches.sum(dim=1),
+            column_mass=column_mass,
             source_valid=source.valid,
             target_valid=target.valid,
+            rounds=tuple(rounds),
         )
 
-    def _affinity(
-        self, source: EgoPillars, target: EgoPillars, gap_s: torch.Tensor
-    ) -> torch.Tensor:
-        cosine = source.feature @ target.feature.transpose(1, 2)
-        distance = 2.0 - 2.0 * cosine  # squared, of unit vectors
-        slack = nn.functional.softplus(self.offset)
-        affinity = -(distance - slack) / (torch.exp(self.scale) + SHARPEST)
-        reach = (self.fastest_mps * gap_s.abs()).clamp_min(_LEAST_REACH_M)
-        apart = torch.cdist(source.position[..., :2], target.position[..., :2])
-        possible = (apart < reach[:, None, None]) & target.valid[:, None, :]
-        possible = possible & source.valid[:, :, None]
-        return affinity.masked_fill(~possible, -torch.inf)
+    def _fit(
+        self, source: EgoPillars, target: EgoPillars, near: torch.Tensor, number: int
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """The motion (B, 4, 4) between level coordinates, and the masses (B, N) behind it.
+
+        ``near`` (B, N, N) is what their places add to the pillars' affinities.
+        """
+        slack = nn.functional.softplus(self.offset[number])
+        sharpness = 1.0 / (torch.exp(self.scale[number]) + SHARPEST)
+        # The affinity is (slack - |f - g|^2) times the sharpness, and |f - g|^2 = 2 - 2 f g; the
+        # constants ride along as one more channel, for the matrices are large.
+        constant = ((slack - 2.0) * sharpness).expand_as(source.feature[..., :1])
+        mine = torch.cat([2.0 * sharpness * source.feature, constant], dim=2)
+        theirs = torch.cat([target.feature, torch.ones_like(target.feature[..., :1])], dim=2)
+        matches = sinkhorn(mine @ theirs.transpose(1, 2) + near, self.sinkhorn_rounds)
+        position = torch.cat([target.position, torch.ones_like(target.position[..., :1])], dim=2)
+        carried = matches.carry(position)
+        row_mass = carried[..., 3]
+        partner = carried[..., :3] / row_mass.clamp_min(1e-6)[..., None]
+        return fit_rigid(source.position, partner, row_mass), row_mass, matches.column_mass()

@@ -28,6 +28,7 @@ class NetworkSettings:
         ego_pillars: Background pillars matched in each frame.
         sinkhorn_rounds: Row and column normalisations.
         fastest_mps: Nothing is matched to what it could only reach faster.
+        rematch_m: How far a pillar may lie from its partner each time it is matched again, metres.
         temporal_channels: Channels of the temporal block, at half the grid's resolution.
         temporal_blocks: How many of them.
         motion_widths: Channels of the motion U-Net by level, from half resolution on; the first
@@ -46,7 +47,8 @@ class NetworkSettings:
     ego_channels: int = 64
     ego_pillars: int = 1024
     sinkhorn_rounds: int = 5
-    fastest_mps: float = 30.0
+    fastest_mps: float = 40.0
+    rematch_m: tuple[float, ...] = (2.0, 0.7)
     temporal_channels: int = 48
     temporal_blocks: int = 2
     motion_widths: tuple[int, ...] = (64, 96, 128)
@@ -56,6 +58,7 @@ class NetworkSettings:
     def __post_init__(self) -> None:
         # A checkpoint's JSON brings lists.
         object.__setattr__(self, "base_widths", tuple(self.base_widths))
+        object.__setattr__(self, "rematch_m", tuple(self.rematch_m))
         object.__setattr__(self, "motion_widths", tuple(self.motion_widths))
         if not 2 <= len(self.base_widths) <= 5 or not 2 <= len(self.motion_widths) <= 4:
             raise SettingsError("a U-Net has 2 to 5 levels (base), 2 to 4 (motion)")

@@ -60,12 +60,15 @@ def lovasz(errors: torch.Tensor, truth: torch.Tensor) -> torch.Tensor:
 def ego_loss(match: EgoMatch, true_level: torch.Tensor) -> torch.Tensor:
     """L1 between pillars moved by the estimated and the true motion, plus the inlier loss.
 
+    Every round of matching answers for its own motion, the last for the masses.
+
     Args:
         match: Of B pairs of frames.
         true_level: (B, 4, 4) true level_target_from_source.
     """
-    error = move(match.level_target_from_source, match.source) - move(true_level, match.source)
-    distance = _mean(error.abs().sum(dim=2), match.source_valid)
+    true = move(true_level, match.source)
+    errors = [(move(motion, match.source) - true).abs().sum(dim=2) for motion in match.rounds]
+    distance = _mean(torch.stack(errors).mean(dim=0), match.source_valid)
     outliers = torch.cat([1.0 - match.row_mass, 1.0 - match.column_mass], dim=1)
     valid = torch.cat([match.source_valid, match.target_valid], dim=1)
     return distance + INLIER_WEIGHT * _mean(outliers, valid)

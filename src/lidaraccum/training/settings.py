@@ -19,11 +19,13 @@ class OptimiserSettings:
     Attributes:
         rate: Learning rate at the start.
         schedule: ``exponential``: times ``decay`` every ``epoch_steps``; ``cosine``: down to a
-            hundredth at the last step.
+            hundredth at the end of the run, by steps where they are given, else by the clock (and
+            then no two runs are quite alike).
         decay: Of an epoch.
         epoch_steps: Steps that count as an epoch; simulation has no end.
         warmup_steps: Over which the rate rises from nothing.
-        clip: Longest gradient.
+        clip: Longest gradient of each part of the network by itself: TubeNet's, with rotations
+            counting 50 times, is dozens of times longer than the others' and would drown them.
         average: Share of the old in the running mean of the weights, which is what is kept.
         batch: Windows a step.
     """
@@ -33,7 +35,7 @@ class OptimiserSettings:
     decay: float = 0.98
     epoch_steps: int = 1000
     warmup_steps: int = 50
-    clip: float = 1.0
+    clip: float = 5.0
     average: float = 0.999
     batch: int = 2
 
@@ -54,6 +56,8 @@ class TrainSettings:
         objective: What the loss is made of.
         optimiser: Adam and its schedule.
         seed: Of the weights, the drives and everything drawn.
+        keep_drives: So many simulated drives are made once, stored in the run's folder (some 15 MB
+            each) and cut anew again and again; 0 simulates a new one each time.
         steps: Stop after so many.
         hours: Stop after so long, counted over all resumptions; whichever comes first.
         start_from: Weights to go on from (fine-tuning), a checkpoint of the package.
@@ -71,6 +75,7 @@ class TrainSettings:
     objective: ObjectiveSettings = field(default_factory=ObjectiveSettings)
     optimiser: OptimiserSettings = field(default_factory=OptimiserSettings)
     seed: int = 0
+    keep_drives: int = 0
     steps: int | None = None
     hours: float | None = None
     start_from: Path | None = None
@@ -85,9 +90,9 @@ class TrainSettings:
     def __post_init__(self) -> None:
         if self.steps is None and self.hours is None:
             raise SettingsError("training needs an end", hint="give steps or hours")
-        if self.optimiser.schedule == "cosine" and self.steps is None:
-            raise SettingsError("a cosine schedule needs the number of steps")
         if self.device not in ("auto", "cpu", "cuda"):
             raise SettingsError(f"the device is auto, cpu or cuda, not {self.device!r}")
-        if self.workers < 0 or self.log_steps < 1 or self.checkpoint_minutes < 0:
-            raise SettingsError("workers, log_steps and checkpoint_minutes cannot be negative")
+        if min(self.workers, self.checkpoint_minutes, self.keep_drives) < 0 or self.log_steps < 1:
+            raise SettingsError(
+                "workers, checkpoint_minutes, keep_drives and log_steps cannot be negative"
+            )

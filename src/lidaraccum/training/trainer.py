@@ -16,8 +16,10 @@ from lidaraccum.errors import OutputExistsError, SettingsError
 from lidaraccum.model.checkpoint import load_network
 from lidaraccum.model.network import build_network
 from lidaraccum.model.precision import inference
+from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.training.dataset import SimulatedDrives, ValidationDrives, WindowSource
 from lidaraccum.training.journal import Journal
+from lidaraccum.training.kept import KeptDrives
 from lidaraccum.training.loader import batches_from
 from lidaraccum.training.objective import Losses, objective
 from lidaraccum.training.scores import Scores, score_network
@@ -32,6 +34,9 @@ from lidaraccum.training.state import (
 )
 from lidaraccum.training.watch import Watch
 from lidaraccum.training.window import Batch, TrainingWindow, make_batch
+
+DRIVES_FOLDER = "drives"
+"""Of a run's folder: drives that are kept."""
 
 _log = logging.getLogger(__name__)
 
@@ -106,8 +111,9 @@ class _Run:
             restore_state(self.state, settings, out_dir)
             _log.info("resumed at step %d", self.state.step)
         network = self.state.network.settings
-        self.source = source or SimulatedDrives(network, settings.windows, settings.seed)
+        self.source = source or _simulated_source(settings, network, out_dir)
         self.held_out = held_out or ValidationDrives(network, settings.windows.extent_m)
+        self.held_out_windows: list[TrainingWindow] = []
         self.journal = Journal(out_dir / METRICS_FILE, self.state.step)
         self.began = time.monotonic() - self.state.seconds
         self.scores: Scores | None = None
@@ -144,23 +150,32 @@ class _Run:
             self.settings.workers,
         )
 
-    def _is_over(self) -> bool:
+    def _spent(self) -> float:
+        """Share of the budget used up, 0..1: of steps where they are given, else of time."""
         steps, hours = self.settings.steps, self.settings.hours
-        if self.watch.wants_end() or (steps is not None and self.state.step >= steps):
-            return True
-        return hours is not None and time.monotonic() - self.began >= 3600.0 * hours
+        if steps is not None:
+            return self.state.step / steps if steps else 1.0
+        assert hours is not None, "the settings ask for an end"
+        return (time.monotonic() - self.began) / (3600.0 * hours) if hours else 1.0
+
+    def _rate(self) -> float:
+        return learning_rate(self.settings.optimiser, self.state.step, self._spent())
+
+    def _is_over(self) -> bool:
+        hours = self.settings.hours
+        late = hours is not None and time.monotonic() - self.began >= 3600.0 * hours
+        return late or self._spent() >= 1.0 or self.watch.wants_end()
 
     def _step(self, batch: Batch) -> Losses:
         state, settings = self.state, self.settings
         generator = torch.Generator().manual_seed(settings.seed * 1_000_003 + state.step)
         for group in state.optimiser.param_groups:
-            group["lr"] = learning_rate(settings.optimiser, state.step, settings.steps)
+            group["lr"] = self._rate()
         state.optimiser.zero_grad(set_to_none=True)
         with inference(self.device):
             losses = objective(state.network, batch, settings.objective, generator)
         losses.total.backward()  # type: ignore[no-untyped-call]
-        length = torch.nn.utils.clip_grad_norm_(state.network.parameters(), settings.optimiser.clip)
-        if torch.isfinite(length):
+        if clip_gradients(state.network, settings.optimiser.clip):
             state.optimiser.step()
         else:  # one window must not end a run of days
             _log.warning("step %d: gradient is not finite, nothing learned", state.step)
@@ -170,8 +185,7 @@ class _Run:
 
     def _note_losses(self, names: tuple[str, ...], recent: list[list[float]]) -> None:
         means = [sum(column) / len(recent) for column in zip(*recent, strict=True)]
-        rate = learning_rate(self.settings.optimiser, self.state.step, self.settings.steps)
-        numbers = dict(zip(names, means, strict=True)) | {"rate": rate}
+        numbers = dict(zip(names, means, strict=True)) | {"rate": self._rate()}
         self.journal.note("loss", self.state.step, time.monotonic() - self.began, numbers)
 
     def _validate(self) -> None:
@@ -181,13 +195,27 @@ class _Run:
         self.watch.on_scores(self.state.step, self.scores)
 
     def _held_out_batches(self) -> Iterator[Batch]:
-        for place in range(self.settings.validation_windows):
-            for window in self.held_out.windows(place):
-                yield make_batch([window], self.device)
+        if not self.held_out_windows:  # made once: they are the same each time
+            places = range(self.settings.validation_windows)
+            self.held_out_windows = [w for place in places for w in self.held_out.windows(place)]
+        return (make_batch([window], self.device) for window in self.held_out_windows)
 
     def _save(self) -> None:
         self.state.seconds = time.monotonic() - self.began
         save_state(self.state, self.settings, self.out_dir)
+
+
+def _simulated_source(
+    settings: TrainSettings, network: NetworkSettings, out_dir: Path
+) -> WindowSource:
+    drives = SimulatedDrives(network, settings.windows, settings.seed)
+    if not settings.keep_drives:
+        return drives
+    folder = out_dir / DRIVES_FOLDER
+    folder.mkdir(exist_ok=True)
+    return KeptDrives(
+        folder, drives.make, settings.keep_drives, network, settings.windows, settings.seed
+    )
 
 
 def _pick_device(name: str) -> torch.device:
@@ -209,14 +237,22 @@ def _fresh_state(settings: TrainSettings, device: torch.device) -> RunState:
     return RunState(network, average, optimiser)
 
 
-def learning_rate(settings: OptimiserSettings, step: int, steps: int | None) -> float:
-    """Rate of step ``step`` (from 0) of ``steps``."""
+def learning_rate(settings: OptimiserSettings, step: int, spent: float) -> float:
+    """Rate of step ``step`` (from 0), when the share ``spent`` (0..1) of the budget is used up."""
     rise = min(1.0, (step + 1) / settings.warmup_steps) if settings.warmup_steps else 1.0
-    if settings.schedule == "cosine" and steps:
-        fall = 0.505 + 0.495 * math.cos(math.pi * min(step / steps, 1.0))
+    if settings.schedule == "cosine":
+        fall = 0.505 + 0.495 * math.cos(math.pi * min(spent, 1.0))
     else:
         fall = settings.decay ** (step / settings.epoch_steps)
     return settings.rate * rise * fall
+
+
+def clip_gradients(network: torch.nn.Module, longest: float) -> bool:
+    """Shorten the gradients of each part of the network; whether all are finite."""
+    lengths = [
+        torch.nn.utils.clip_grad_norm_(part.parameters(), longest) for part in network.children()
+    ]
+    return bool(torch.isfinite(torch.stack(lengths)).all())
 
 
 @torch.no_grad()
