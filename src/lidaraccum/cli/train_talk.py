@@ -94,7 +94,7 @@ class TrainTalk:
         """One step more."""
         if not self._began:
             self._began = True
-            self._since = (step - 1, self._since[1])
+            self._since = (step, time.monotonic())  # the first step waits for the first windows
             self._on_first()
             self._open_bar(step - 1)
         self._latest = (step, time.monotonic())
@@ -146,7 +146,8 @@ class TrainTalk:
     def _speed(self) -> float:
         """Windows a second since the last validation, itself not counted."""
         (first, start), (last, end) = self._since, self._latest
-        return (last - first) * self._settings.optimiser.batch / max(end - start, 1e-9)
+        windows = (last - first) * self._settings.optimiser.batch
+        return windows / (end - start) if windows else math.nan
 
     def _mean_loss(self) -> float:
         return sum(self._losses) / len(self._losses) if self._losses else math.nan
