@@ -16,6 +16,7 @@ from lidaraccum.errors import InputError, MissingDependencyError
 from lidaraccum.io.columns import readable
 
 INSTALL = "pip install 'pyarrow>=14', or this package with its extra 'convert'"
+BUFFER_BYTES = 1 << 22
 
 Record = TypeVar("Record")
 Table = Mapping[str, NDArray[Any]]
@@ -112,7 +113,8 @@ class ParquetRows:
         with _arrow_file(path):
             import pyarrow.parquet as pq
 
-            self._file = pq.ParquetFile(path)
+            # Read piece by piece: a column of one row group may hold a whole segment.
+            self._file = pq.ParquetFile(path, buffer_size=BUFFER_BYTES, pre_buffer=False)
             _check_columns(path, self._file.schema_arrow.names, columns)
         groups = self._file.metadata
         counts = [groups.row_group(group).num_rows for group in range(groups.num_row_groups)]
