@@ -11,7 +11,7 @@ import click
 from lidaraccum.cli import options
 from lidaraccum.cli.door import Command
 from lidaraccum.cli.progress import watch
-from lidaraccum.cli.settings import accumulate_settings, open_source, reported
+from lidaraccum.cli.settings import accumulate_settings, open_source, reported, with_method
 from lidaraccum.errors import DoubtfulResultError
 
 if TYPE_CHECKING:
@@ -56,6 +56,7 @@ def accumulate(**params: Any) -> None:
     """
     from lidaraccum.pipeline.output import OutputSettings, accumulate_to_files, check_outputs
 
+    params = with_method(params)
     output = OutputSettings(
         path=params["output"],
         overwrite=params["overwrite"],

@@ -18,6 +18,7 @@ from lidaraccum.cli.settings import open_source
 @click.option("--repeat", type=click.IntRange(min=1), default=3, help="Runs; medians are told.")
 @click.option("--window", type=click.IntRange(min=2), default=5, help="Frames a window.")
 @click.option("--method", default="ego-only", metavar="NAME", help="What finds movers.")
+@options.weights_option
 @options.input_options
 @options.registration_options
 @options.talk_options
@@ -35,7 +36,9 @@ def benchmark(**params: Any) -> None:
 
     registration = RegistrationSettings(deskew=params["deskew"], poses_mode=params["poses_mode"])
     settings = BenchmarkSettings(
-        accumulate=AccumulateSettings(method=params["method"], registration=registration),
+        accumulate=AccumulateSettings(
+            method=params["method"], weights=params["weights"], registration=registration
+        ),
         repeat=params["repeat"],
         window=params["window"],
     )

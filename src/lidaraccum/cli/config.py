@@ -10,7 +10,7 @@ from click.core import ParameterSource
 
 from lidaraccum.cli import options
 from lidaraccum.cli.door import Command
-from lidaraccum.cli.settings import TALK, reported
+from lidaraccum.cli.settings import TALK, reported, with_method
 
 _SOURCES = {
     ParameterSource.COMMANDLINE: "flag",
@@ -32,6 +32,7 @@ def config(**params: Any) -> None:
     printed can be saved and given to --config.
     """
     ctx = click.get_current_context()
+    params = with_method(params)
     values = reported(params)
     if params["as_json"]:
         click.echo(json.dumps(values, indent=1))

@@ -54,6 +54,7 @@ class Lengths(click.ParamType):  # type: ignore[type-arg,unused-ignore]
     metavar="NAME",
     help="What to score; may be given several times, 'all' for all.",
 )
+@options.weights_option
 @click.option("--window", type=click.IntRange(min=2), default=5, help="Frames a window.")
 @click.option(
     "--stride",
@@ -122,14 +123,15 @@ def evaluate(**params: Any) -> None:
 
 
 def _settings(params: dict[str, Any]) -> EvaluationSettings:
-    from lidaraccum.evaluation.baselines import METHODS
+    from lidaraccum.evaluation.baselines import all_names
     from lidaraccum.evaluation.evaluate import EvaluationSettings
     from lidaraccum.evaluation.truth import Scope
     from lidaraccum.registration.settings import RegistrationSettings
 
     named = tuple(params["method"])
     return EvaluationSettings(
-        methods=tuple(one.name for one in METHODS) if named == ("all",) else named,
+        methods=all_names(params["weights"]) if named == ("all",) else named,
+        weights=params["weights"],
         length=params["window"],
         stride=params["stride"],
         target=params["target"],

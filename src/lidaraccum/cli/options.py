@@ -138,13 +138,23 @@ registration_options = _stack(
     ),
 )
 
+weights_option = click.option(
+    "--weights",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="The network's weights; without it those that came with the package.",
+)
+
 result_options = _stack(
     click.option(
         "--method",
-        type=click.Choice(["label-free", "ego-only", "oracle"]),
-        default="label-free",
-        help="What finds movers: geometry alone, nothing, or labels that came along.",
+        type=click.Choice(["network", "label-free", "ego-only", "oracle"]),
+        show_default="network where there are weights, else label-free",
+        help="What finds movers: the network verified by geometry, geometry alone, nothing, or "
+        "labels that came along.",
     ),
+    weights_option,
+    click.option("--no-network", is_flag=True, help="Geometry alone finds movers: label-free."),
     click.option(
         "--preset",
         type=click.Choice(["conservative", "balanced", "aggressive"]),

@@ -34,6 +34,22 @@ def open_source(params: Mapping[str, Any]) -> FileSequence:
     return open_sequence(chosen_source(params["sequence"]), settings)
 
 
+def with_method(params: Mapping[str, Any]) -> dict[str, Any]:
+    """The options with the method that they come to.
+
+    Raises:
+        SettingsError: They ask for the network and for none.
+    """
+    from lidaraccum.pipeline.accumulator import default_method
+
+    method = params["method"]
+    if params["no_network"]:
+        if params["weights"] or method == "network":
+            raise SettingsError("--no-network takes no weights and no method network")
+        method = method or "label-free"
+    return {**params, "method": method or default_method(params["weights"])}
+
+
 def accumulate_settings(params: Mapping[str, Any]) -> AccumulateSettings:
     """What decides how the cloud looks."""
     from lidaraccum.pipeline.accumulator import AccumulateSettings
@@ -44,6 +60,7 @@ def accumulate_settings(params: Mapping[str, Any]) -> AccumulateSettings:
         raise SettingsError("--poses-mode refine needs --poses", hint="auto for those found")
     return AccumulateSettings(
         method=params["method"],
+        weights=params["weights"],
         preset=params["preset"],
         reference=params["reference"],
         registration=RegistrationSettings(deskew=params["deskew"], poses_mode=params["poses_mode"]),

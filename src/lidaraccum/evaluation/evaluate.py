@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,8 @@ class EvaluationSettings:
     """What is scored, and how.
 
     Attributes:
-        methods: Names in `baselines.METHODS`.
+        methods: Names in `baselines.METHODS`, or ``network``.
+        weights: Of method ``network``, a file; those that came with the package when None.
         length: Frames a window, T.
         stride: Frames from one window's start to the next; 0 for windows side by side.
         target: One of `TARGETS`: whose coordinates all frames are taken to.
@@ -43,6 +45,7 @@ class EvaluationSettings:
     """
 
     methods: tuple[str, ...] = ("ego-only",)
+    weights: Path | None = None
     length: int = WINDOW_FRAMES
     stride: int = 0
     target: str = "first"
@@ -58,8 +61,11 @@ class EvaluationSettings:
             raise SettingsError(f"a stride must not be negative, but is {self.stride}")
         if self.target not in TARGETS:
             raise SettingsError(f"there is no target {self.target!r}", hint=f"one of {TARGETS}")
-        for name in self.methods:
-            method_by_name(name)
+        self.chosen_methods()
+
+    def chosen_methods(self) -> tuple[Method, ...]:
+        """The methods that the names and the weights stand for."""
+        return tuple(method_by_name(name, self.weights) for name in self.methods)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +120,7 @@ def evaluate(
         InputError: No sequence has a window's worth of frames, or one has no labels.
     """
     settings = settings or EvaluationSettings()
-    gathered = [_Gathered(method_by_name(name)) for name in settings.methods]
+    gathered = [_Gathered(method) for method in settings.chosen_methods()]
     for number, sequence in enumerate(sequences):
         for length in sorted({settings.length, *settings.lengths}):
             stride = settings.stride or settings.length
@@ -172,8 +178,7 @@ def score_methods(window: Window, settings: EvaluationSettings) -> Iterator[Scor
     truth = window_truth(window, settings.scope)
     posed = _register(window, settings, window.true_poses if settings.given_poses else None)
     chained: _Posed | None = None
-    for name in settings.methods:
-        method = method_by_name(name)
+    for method in settings.chosen_methods():
         if method.chained and not settings.given_poses:
             chained = chained or _chain(window, settings, posed)
             yield _score(window, truth, method, chained)

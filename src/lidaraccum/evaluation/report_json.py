@@ -21,7 +21,10 @@ from lidaraccum.metrics.association import IOU_THRESHOLDS
 def as_json(report: EvaluationReport) -> str:
     """The report as a JSON object."""
     content = {
-        "settings": asdict(report.settings),
+        "settings": {
+            **asdict(report.settings),
+            "weights": None if report.settings.weights is None else str(report.settings.weights),
+        },
         "methods": [_method(one) for one in report.methods],
         "paper": [asdict(row) for row in paper.ROWS],
     }
@@ -34,6 +37,7 @@ def _method(one: MethodReport) -> dict[str, Any]:
     return {
         "method": one.method.name,
         "told": one.method.told,
+        "weights": one.method.weights,
         "windows": scores.windows,
         "static_points": flow.static.points,
         "dynamic_points": flow.dynamic.points,

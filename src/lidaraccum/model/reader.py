@@ -61,7 +61,7 @@ class NetworkReader:
 
     def __init__(self, network: Network, weights: str = "") -> None:
         self._network = network.eval().requires_grad_(False)
-        self.weights = weights
+        self._weights = weights
 
     @classmethod
     def open(cls, path: Path) -> NetworkReader:
@@ -72,6 +72,11 @@ class NetworkReader:
             InputError: It holds no weights of this network.
         """
         return cls(load_network(path), weights_hash(path))
+
+    @property
+    def weights(self) -> str:
+        """SHA-256 of the weights' file."""
+        return self._weights
 
     def read(self, frame: Frame) -> EncodedFrame:
         """Encode a frame (points in sensor coordinates, motion within the sweep undone), once."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -15,9 +16,11 @@ from lidaraccum.data.registered import RegisteredFrame
 from lidaraccum.data.sequence import LabelledSequence, Sequence
 from lidaraccum.errors import InputError, SettingsError
 from lidaraccum.geometry import rigid
+from lidaraccum.model.weights import chosen_weights, shipped_weights
 from lidaraccum.pipeline.clock import StageClock
 from lidaraccum.pipeline.label_free import LabelFree
 from lidaraccum.pipeline.motion_settings import PRESETS
+from lidaraccum.pipeline.network_led import NetworkLed
 from lidaraccum.pipeline.perception import AllStatic, GivenLabels, Perceiver
 from lidaraccum.pipeline.placing import Reference
 from lidaraccum.pipeline.read_ahead import read_ahead
@@ -25,13 +28,20 @@ from lidaraccum.pipeline.report import FrameTally
 from lidaraccum.pipeline.selection import Selection, SelectionSettings
 from lidaraccum.pipeline.spool import after_the_last
 from lidaraccum.pipeline.tracks import TrackBook
+from lidaraccum.pipeline.tubes import Reader
 from lidaraccum.registration.odometry import register
 from lidaraccum.registration.settings import RegistrationSettings
 
 log = logging.getLogger(__name__)
 
-METHODS = ("label-free", "ego-only", "oracle")
-"""What finds the movers: geometry alone, nothing, or the labels that came with the sequence."""
+METHODS = ("network", "label-free", "ego-only", "oracle")
+"""What finds the movers: the network verified by geometry, geometry alone, nothing, or the labels
+that came with the sequence."""
+
+
+def default_method(weights: Path | None = None) -> str:
+    """``network`` where there are weights, named or shipped, otherwise ``label-free``."""
+    return "network" if weights or shipped_weights() else "label-free"
 
 
 @dataclass(frozen=True)
@@ -39,7 +49,8 @@ class AccumulateSettings:
     """Everything that decides what the cloud looks like.
 
     Attributes:
-        method: One of `METHODS`.
+        method: One of `METHODS`; `default_method` where none is named.
+        weights: The network's, a file; those that came with the package when None.
         preset: How readily something is called moving, a name in `motion_settings.PRESETS`.
         reference: Whose coordinates the cloud is in: ``first``, ``middle``, ``last``, a frame's
             index (negative from the end), or ``world`` for the coordinates of given poses.
@@ -47,13 +58,18 @@ class AccumulateSettings:
         selection: Which points are kept.
     """
 
-    method: str = "label-free"
+    method: str = ""
+    weights: Path | None = None
     preset: str = "balanced"
     reference: str = "first"
     registration: RegistrationSettings = field(default_factory=RegistrationSettings)
     selection: SelectionSettings = field(default_factory=SelectionSettings)
 
     def __post_init__(self) -> None:
+        if not self.method:
+            object.__setattr__(self, "method", default_method(self.weights))
+        if self.weights and self.method != "network":
+            raise SettingsError(f"method {self.method!r} takes no weights", hint="network does")
         if self.method not in METHODS:
             raise SettingsError(
                 f"there is no method {self.method!r}", hint=f"one of {', '.join(METHODS)}"
@@ -106,6 +122,7 @@ class Accumulator:
         self._settings = settings
         self._reference_index = reference_index(settings.reference, sequence)
         self._perceiver = perceiver or choose_perceiver(settings, sequence)
+        self.weights = self._perceiver.weights if isinstance(self._perceiver, NetworkLed) else None
         self._registered = registered
         self._selection = Selection(settings.selection)
         self._book = TrackBook()
@@ -205,8 +222,10 @@ def choose_perceiver(settings: AccumulateSettings, sequence: Sequence) -> Percei
     """What finds the movers of this sequence.
 
     Raises:
-        InputError: The method needs labels and the sequence has none.
+        InputError: The method needs labels or weights and there are none, or they cannot be read.
     """
+    if settings.method == "network":
+        return NetworkLed(open_reader(settings.weights), PRESETS[settings.preset])
     if settings.method == "label-free":
         return LabelFree(PRESETS[settings.preset])
     if settings.method == "ego-only":
@@ -217,3 +236,14 @@ def choose_perceiver(settings: AccumulateSettings, sequence: Sequence) -> Percei
             hint="method oracle reads labels/ beside frames/",
         )
     return GivenLabels(sequence)
+
+
+def open_reader(weights: Path | None = None) -> Reader:
+    """The network that a file holds, or the shipped one.
+
+    Raises:
+        InputError: There is no such file, or none was shipped, or it holds no such network.
+    """
+    from lidaraccum.model.reader import NetworkReader  # torch takes a second to load
+
+    return NetworkReader.open(chosen_weights(weights))

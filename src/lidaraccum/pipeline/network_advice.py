@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ class NetworkAdvice:
         self._reader = reader
         self._settings = settings
         self._still = StillObjects(ids)
-        self._encoded: dict[int, object] = {}
+        self._encoded: dict[int, Any] = {}
         self._readings: dict[int, FrameReading] = {}
         self._tubes: list[Tube] = []
         self._next_unread = 0

@@ -25,6 +25,11 @@ class NetworkLed:
         self._reader = reader
         self._settings = settings
 
+    @property
+    def weights(self) -> str:
+        """Hash of the network's weights."""
+        return self._reader.weights
+
     def perceive(self, frames: Iterable[RegisteredFrame]) -> Iterator[PerceivedFrame]:
         """Each frame once, in order, its movers labelled and placed, what stands named."""
         ids = ObjectIds()

@@ -18,6 +18,10 @@ DECIDING_PACKAGES = ("numpy", "scipy", "laspy", "plyfile")
 """The packages whose version may change a result."""
 
 
+def _deciding(accumulator: Accumulator) -> tuple[str, ...]:
+    return (*DECIDING_PACKAGES, "torch") if accumulator.weights else DECIDING_PACKAGES
+
+
 def objects_json(tracks: Iterable[ObjectTrack]) -> dict[str, Any]:
     """What ``out.objects.json`` holds: each object and its motions."""
     return {
@@ -48,10 +52,10 @@ def report_of(
     tally = accumulator.tally
     return AccumulationReport(
         version=lidaraccum.__version__,
-        versions={name: metadata.version(name) for name in DECIDING_PACKAGES},
+        versions={name: metadata.version(name) for name in _deciding(accumulator)},
         sequence=sequence.name,
         settings=dict(settings),
-        weights=None,
+        weights=accumulator.weights,
         frames=len(tally.poses),
         points_read=tally.points_read,
         points_written=sum(tally.points_by_label.values()),

@@ -63,12 +63,19 @@ class StillObjects:
     def _claim(self, name: int, cells: set[Cell]) -> None:
         own = self._cells.setdefault(name, set())
         self._cells.move_to_end(name)
+        fresh = not own  # what parts from another takes its own places with it
         for cell in sorted(cells):
             if len(own) >= MOST_CELLS:
                 break
-            if cell not in self._owner:
-                self._owner[cell] = name
-                own.add(cell)
+            if cell not in self._owner or fresh:
+                self._give(cell, name)
+
+    def _give(self, cell: Cell, name: int) -> None:
+        before = self._owner.get(cell)
+        if before is not None:
+            self._cells[before].discard(cell)
+        self._owner[cell] = name
+        self._cells[name].add(cell)
 
     def _forget(self) -> None:
         while len(self._cells) > MOST_OBJECTS:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,11 +37,15 @@ moving cost time, but not without end."""
 class Reader(Protocol):
     """The network, as far as the pipeline knows it: `lidaraccum.model.reader.NetworkReader`."""
 
-    def read(self, frame: Frame) -> object:
+    @property
+    def weights(self) -> str:
+        """SHA-256 of its weights, for reports."""
+
+    def read(self, frame: Frame) -> Any:
         """A frame as the network keeps it."""
 
     def look(
-        self, encoded: Sequence[object], world_from_sensor: NDArray[np.float64], target: int
+        self, encoded: Sequence[Any], world_from_sensor: NDArray[np.float64], target: int
     ) -> WindowReading:
         """What T frames, as kept, with poses (T, 4, 4) say together."""
 

@@ -1,0 +1,250 @@
+"""The network proposes, the points decide: right weights find more, wrong ones move nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lidaraccum.data.accumulation import BACKGROUND, MOVING, STILL
+from lidaraccum.data.frame import Frame
+from lidaraccum.data.perceived import PerceivedFrame
+from lidaraccum.geometry import rigid
+from lidaraccum.model.network import build_network
+from lidaraccum.model.reader import NetworkReader
+from lidaraccum.model.reading import FrameReading, ObjectReading, WindowReading
+from lidaraccum.model.settings import NetworkSettings
+from lidaraccum.pipeline.label_free import LabelFree
+from lidaraccum.pipeline.network_led import NetworkLed
+
+PARKED = (((6, 5, 0.2), (10, 6.8, 1.6)), ((14, 5, 0.2), (18.2, 6.8, 1.5)))
+"""Where the street's parked cars stand."""
+
+
+@dataclass(frozen=True)
+class Oracle:
+    """Stands in for the network and says the truth about a street with movers."""
+
+    street: Any
+    movers: Sequence[Any]
+    weights: str = "oracle"
+
+    def read(self, frame: Frame) -> Frame:
+        return frame
+
+    def look(
+        self, encoded: Sequence[Frame], world_from_sensor: np.ndarray, target: int
+    ) -> WindowReading:
+        pairs = zip(encoded, world_from_sensor, strict=True)
+        readings = [self._say(frame, pose, encoded[target].stamp) for frame, pose in pairs]
+        return WindowReading(tuple(readings), target, (list(encoded), world_from_sensor))
+
+    def _say(self, frame: Frame, world_from_sensor: np.ndarray, then: float) -> FrameReading:
+        world = rigid.transform(world_from_sensor, frame.points)
+        on = self._on(frame)
+        goal = world[:, :2].copy()
+        movable = on > 0
+        for low, high in PARKED:
+            inside = ((world > np.array(low) - 0.1) & (world < np.array(high) + 0.1)).all(axis=1)
+            movable |= inside
+            goal[inside] = (np.array(low) + high)[:2] / 2
+        for number, mover in enumerate(self.movers, start=1):
+            goal[on == number] = (mover.place(then) + np.array(mover.size) / 2)[:2]
+        return FrameReading(
+            movable.astype(np.float32),
+            (on > 0).astype(np.float32),
+            (goal - world[:, :2]).astype(np.float32),
+        )
+
+    def track(self, reading: WindowReading, instances: Sequence[np.ndarray]) -> ObjectReading:
+        frames, poses = reading.kept
+        ids = np.unique(np.concatenate([one[one > 0] for one in instances]))
+        seen = np.array([[bool((one == name).any()) for one in instances] for name in ids])
+        anchor = seen.argmax(axis=1)
+        motions = np.tile(np.eye(4), (len(ids), len(frames), 1, 1))
+        for row, name in enumerate(ids):
+            on = [
+                self._on(frame)[own == name] for frame, own in zip(frames, instances, strict=True)
+            ]
+            mover = self.movers[int(np.bincount(np.concatenate(on)).argmax()) - 1]
+            for place, frame in enumerate(frames):
+                shift = mover.place(frames[anchor[row]].stamp) - mover.place(frame.stamp)
+                motions[row, place] = (
+                    rigid.invert(poses[reading.target])
+                    @ rigid.translation(shift)
+                    @ poses[reading.target]
+                )
+        return ObjectReading(ids, anchor, seen, motions)
+
+    def _on(self, frame: Frame) -> np.ndarray:
+        stamps = [registered.frame.stamp for registered in self.street.frames]
+        return np.asarray(self.street.on[stamps.index(frame.stamp)])
+
+
+@dataclass(frozen=True)
+class Liar:
+    """Is sure that everything moves, together with whatever is near, at a speed of its own."""
+
+    speed_mps: float
+    weights: str = "liar"
+
+    def read(self, frame: Frame) -> Frame:
+        return frame
+
+    def look(
+        self, encoded: Sequence[Frame], world_from_sensor: np.ndarray, target: int
+    ) -> WindowReading:
+        rng = np.random.default_rng(0)
+        readings = []
+        for frame in encoded:
+            sure = np.ones(len(frame), dtype=np.float32)
+            offset = rng.normal(0, 0.3, (len(frame), 2)).astype(np.float32)
+            readings.append(FrameReading(sure, sure, offset))
+        return WindowReading(tuple(readings), target, [frame.stamp for frame in encoded])
+
+    def track(self, reading: WindowReading, instances: Sequence[np.ndarray]) -> ObjectReading:
+        stamps = np.array(reading.kept)
+        ids = np.unique(np.concatenate([one[one > 0] for one in instances]))
+        motions = np.tile(np.eye(4), (len(ids), len(stamps), 1, 1))
+        motions[:, :, 0, 3] = self.speed_mps * (stamps[0] - stamps)
+        seen = np.ones((len(ids), len(stamps)), dtype=np.bool_)
+        return ObjectReading(ids, np.zeros(len(ids), dtype=np.int64), seen, motions)
+
+
+def perceive(street: Any, reader: Any) -> list[PerceivedFrame]:
+    return list(NetworkLed(reader).perceive(street.frames))
+
+
+def moved_share(frames: Sequence[PerceivedFrame], on: Sequence[np.ndarray]) -> float:
+    """Of the points that stand."""
+    said = np.concatenate([frame.label == MOVING for frame in frames])
+    stands = np.concatenate(on) == 0
+    return float((said & stands).sum() / stands.sum())
+
+
+@pytest.fixture(scope="module")
+def fresh() -> NetworkReader:
+    """Fresh weights that take nearly everything for movable."""
+    settings = NetworkSettings(
+        extent_m=32.0, base_widths=(16, 24, 32), motion_widths=(32, 48), ego_pillars=64
+    )
+    network = build_network(settings, seed=3)
+    network.foreground_head[2].bias.data.fill_(-0.9)
+    for head in (network.point_head.foreground, network.point_head.dynamic):
+        head.bias.data.fill_(0.2)
+    return NetworkReader(network)
+
+
+def test_fresh_weights_move_nothing_that_stands(look: Any, fresh: NetworkReader) -> None:
+    street = look(noise=0.03)
+    frames = perceive(street, fresh)
+    assert any((frame.label == STILL).any() for frame in frames), "nothing was proposed"
+    assert moved_share(frames, street.on) <= 0.005
+    for before, frame in zip(street.frames, frames, strict=True):
+        assert frame.registered.world_from_sensor is before.world_from_sensor
+
+
+@pytest.mark.parametrize("speed", [0.7, -2.0, 6.0])
+def test_sure_and_wrong_weights_move_nothing_that_stands(look: Any, speed: float) -> None:
+    street = look(noise=0.03)
+    assert moved_share(perceive(street, Liar(speed)), street.on) <= 0.005
+
+
+def test_movers_are_found_beside_a_liar(busy_street: Any) -> None:
+    frames = perceive(busy_street, Liar(3.0))
+    said = np.concatenate([frame.label == MOVING for frame in frames])
+    true = np.concatenate(busy_street.on) > 0
+    assert (said & true).sum() > 0.9 * true.sum()
+    assert moved_share(frames, busy_street.on) <= 0.005
+
+
+def test_a_silent_network_changes_nothing(busy_street: Any) -> None:
+    class Silent(Liar):
+        def look(
+            self, encoded: Sequence[Frame], world_from_sensor: np.ndarray, target: int
+        ) -> WindowReading:
+            readings = tuple(FrameReading.background(len(frame)) for frame in encoded)
+            return WindowReading(readings, target)
+
+    alone = list(LabelFree().perceive(busy_street.frames))
+    for frame, again in zip(alone, perceive(busy_street, Silent(0.0)), strict=True):
+        assert (frame.label == again.label).all()
+        assert (frame.instance == again.instance).all()
+        assert (frame.confidence == again.confidence).all()
+        assert frame.world_from_object.keys() == again.world_from_object.keys()
+
+
+def test_movers_that_free_space_alone_misses_are_found(look: Any, new_mover: Any) -> None:
+    """A walker along a wall: in half a second nobody sees through where he was."""
+    walker = new_mover(low=(12.0, -11.6, 0.0), size=(0.5, 0.5, 1.75), velocity=(-1.2, 0.0, 0.0))
+    street = look([walker], count=5)
+    on = np.concatenate(street.on) == 1
+    alone = np.concatenate([f.label == MOVING for f in LabelFree().perceive(street.frames)])
+    frames = perceive(street, Oracle(street, [walker]))
+    led = np.concatenate([frame.label == MOVING for frame in frames])
+    assert alone[on].mean() < 0.2
+    assert led[on].mean() > 0.9
+    assert moved_share(frames, street.on) < 0.001
+    (mover,) = {name for frame in frames for name in frame.world_from_object}
+    first, last = frames[0].world_from_object[mover], frames[-1].world_from_object[mover]
+    np.testing.assert_allclose(last[:3, 3] - first[:3, 3], [-0.48, 0, 0], atol=0.1)
+
+
+def test_what_stands_is_named_once_for_the_whole_drive(look: Any) -> None:
+    street = look(count=16)
+    frames = perceive(street, Oracle(street, []))
+    names: list[set[int]] = [set(), set()]
+    for frame, registered in zip(frames, street.frames, strict=True):
+        world = rigid.transform(registered.world_from_sensor, registered.frame.points)
+        for number, (low, high) in enumerate(PARKED):
+            inside = ((world > np.array(low)) & (world < np.array(high) + 0.05)).all(axis=1)
+            inside &= world[:, 2] > 0.3
+            if inside.sum() > 30:
+                assert (frame.label[inside] == STILL).mean() > 0.95
+                assert (frame.confidence[inside] > 0.5).all()
+                names[number] |= set(np.unique(frame.instance[inside]).tolist())
+        assert (frame.instance > 0)[frame.label != BACKGROUND].all()
+        assert not frame.world_from_object
+    assert [len(one) for one in names] == [1, 1]
+    assert names[0] != names[1]
+
+
+def test_what_stops_keeps_its_name(look: Any, new_mover: Any) -> None:
+    stopping = new_mover(
+        low=(14.0, -4.5, 0.15), size=(4.2, 1.8, 1.45), velocity=(-6.0, 0.0, 0.0), stops_after_s=0.8
+    )
+    street = look([stopping], count=20, speed=2.0)
+    frames = perceive(street, StoppingOracle(street, [stopping]))
+    car = int(np.bincount(frames[4].instance[street.on[4] == 1]).argmax())
+    assert (frames[-1].label[street.on[-1] == 1] == STILL).mean() > 0.8
+    assert (frames[-1].instance[street.on[-1] == 1] == car).mean() > 0.8
+
+
+class StoppingOracle(Oracle):
+    """Says that what has stopped does not move."""
+
+    def _say(self, frame: Frame, world_from_sensor: np.ndarray, then: float) -> FrameReading:
+        said = super()._say(frame, world_from_sensor, then)
+        moves = said.dynamic if frame.stamp < self.movers[0].stops_after_s else 0 * said.dynamic
+        return FrameReading(said.foreground, moves, said.offset)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 6])
+def test_short_drives_leave_whole(look: Any, new_mover: Any, count: int) -> None:
+    walker = new_mover(low=(9.0, 3.0, 0.0), size=(0.5, 0.5, 1.75), velocity=(0.0, -1.6, 0.0))
+    street = look([walker], count=count)
+    frames = perceive(street, Oracle(street, [walker]))
+    assert [frame.registered.index for frame in frames] == list(range(count))
+
+
+def test_a_frame_without_points_is_no_trouble(busy_street: Any, fresh: NetworkReader) -> None:
+    from dataclasses import replace
+
+    frames = list(busy_street.frames[:6])
+    empty = Frame(np.zeros((0, 3), np.float32), frames[3].frame.stamp)
+    frames[3] = replace(frames[3], frame=empty)
+    answers = NetworkLed(fresh).perceive(frames)
+    assert [len(one.label) for one in answers] == [len(one.frame) for one in frames]
