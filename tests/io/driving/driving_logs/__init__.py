@@ -6,10 +6,18 @@ from pathlib import Path
 
 from driving_logs.argoverse2 import write_argoverse2
 from driving_logs.nuscenes import write_nuscenes
-from driving_logs.street import MOVER, PARKED, SIGN, THINGS, WALKER, Written
+from driving_logs.street import (
+    MOVER,
+    PARKED,
+    SIGN,
+    THINGS,
+    WALKER,
+    Written,
+    vehicle_at,
+)
 from driving_logs.waymo import write_waymo
 
-__all__ = ["MOVER", "PARKED", "SIGN", "THINGS", "WALKER", "Written", "write"]
+__all__ = ["MOVER", "PARKED", "SIGN", "THINGS", "WALKER", "Written", "vehicle_at", "write"]
 
 
 def write(kind: str, root: Path) -> Written:
