@@ -132,8 +132,10 @@ def test_both_returns_and_no_label_zones_of_waymo(
     assert run("convert", "waymo", source.root, "-o", tmp_path).exit_code == 0
     sequence = lidaraccum.open_sequence(tmp_path / source.name)
     frame, labels, made = sequence[1], sequence.labels(1), source.truth(1)
-    second = frame.attributes["return_number"] == 2
-    assert np.count_nonzero(second) == 1
+    returns = [sequence[index].attributes["return_number"] for index in range(len(sequence))]
+    assert [np.count_nonzero(one == 2) for one in returns] == [1, 1, 1, 0]
+    second = returns[1] == 2
+    np.testing.assert_allclose(frame.ranges[second], 30.0, atol=0.5)
     assert labels.annotated is not None
     np.testing.assert_array_equal(labels.annotated[~second], ~made.in_no_label_zone)
     assert 0 < made.in_no_label_zone.sum() < len(made.column)

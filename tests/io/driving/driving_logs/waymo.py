@@ -26,7 +26,10 @@ from lidaraccum.geometry import rigid
 
 
 def write_waymo(root: Path, name: str = "10023947602400723454_1120_000_1140_000") -> Written:
-    """Four frames at 10 Hz, each measured over 0.1 s; a second laser that is to be passed over."""
+    """Four frames at 10 Hz, each measured over 0.1 s; a second laser that is to be passed over.
+
+    Each frame has one second return, the last one none.
+    """
     seconds = 0.1 * np.arange(4)
     vehicle_from_laser = pose(*ROOF, 2.58)
     lidar, laser_poses, vehicles, boxes = [], [], [], []
@@ -43,17 +46,11 @@ def write_waymo(root: Path, name: str = "10023947602400723454_1120_000_1140_000"
         )
         second = np.full_like(image, -1.0)
         second[5, 7] = [30.0, 2.0, 0.5, -1.0]
-        for laser in (2, 1):
-            lidar.append(
-                {
-                    **key,
-                    "key.laser_name": laser,
-                    **_image(
-                        "[LiDARComponent].range_image_return1", image if laser == 1 else -image
-                    ),
-                    **_image("[LiDARComponent].range_image_return2", second),
-                }
-            )
+        second = second if time < seconds[-1] else None
+        for laser, first in ((2, -image), (1, image)):
+            images = _image("[LiDARComponent].range_image_return1", first)
+            images |= _image("[LiDARComponent].range_image_return2", second)
+            lidar.append({**key, "key.laser_name": laser, **images})
         columns = np.array([_angles(vehicle_at(at)) for at in column_times(time, 0.1)])
         every = np.broadcast_to(columns, (ROWS, COLUMNS, 6)).astype("f4")
         laser_poses.append(
@@ -89,22 +86,32 @@ def write_waymo(root: Path, name: str = "10023947602400723454_1120_000_1140_000"
         ("vehicle_pose", vehicles),
     ):
         (root / component).mkdir(parents=True, exist_ok=True)
-        table = pa.table({column: _column([row[column] for row in rows]) for column in rows[0]})
+        table = pa.table(
+            {name: pa.array([row[name] for row in rows], _type(name)) for name in rows[0]}
+        )
         pq.write_table(table, root / component / f"{name}.parquet", row_group_size=3)
     frame = rigid.translation(-ROOF)
     return Written("waymo", root, name, seconds, frame, tuple(range(4)), sweep_s=0.1)
 
 
-def _image(name: str, image: np.ndarray) -> dict[str, object]:
+def _image(name: str, image: np.ndarray | None) -> dict[str, object]:
+    if image is None:
+        return {f"{name}.values": None, f"{name}.shape": None}
     return {f"{name}.values": image.ravel(), f"{name}.shape": np.array(image.shape, dtype="i4")}
 
 
-def _column(values: list[object]) -> pa.Array:
-    """Values as Waymo types them; arrays become lists."""
-    if isinstance(values[0], np.ndarray):
-        kind = pa.int32() if values[0].dtype.kind == "i" else pa.float32()
-        return pa.array(values, pa.list_(kind))
-    return pa.array(values)
+def _type(column: str) -> pa.DataType | None:
+    """The arrow type that Waymo declares for a column; None for plain numbers and texts."""
+    if column.endswith(".beam_inclination.values"):
+        return pa.list_(pa.float64())
+    if column in ("key.laser_name", "[LiDARBoxComponent].type"):
+        return pa.int8()
+    kinds = {
+        "values": pa.list_(pa.float32()),
+        "shape": pa.list_(pa.int32(), 3),
+        "transform": pa.list_(pa.float64(), 16),
+    }
+    return kinds.get(column.rpartition(".")[2])
 
 
 def _angles(world_from_vehicle: np.ndarray) -> np.ndarray:
