@@ -122,8 +122,9 @@ def test_moving_the_whole_window_moves_the_answer(network: Network, frames: list
     rolled = torch.roll(first.base, tuple(cells.tolist()), dims=(2, 3))
     inner = slice(40, -40)
     off = (second.base - rolled)[:, :, inner, inner].abs()
-    # A point within rounding of a pillar's edge may change pillars.
-    assert float((off > 0.02).float().mean()) < 0.02
+    filled = network.pillars(second.frames)[:, :, inner, inner].abs().sum(dim=1) > 0
+    # A point within rounding of a pillar's edge may change pillars; features are of size 1.
+    assert float(off.mean(dim=1)[filled].mean()) < 0.05
     places = []
     for features in (first, second):
         seen = network.perceive(features, still(3), Windows.single(3))

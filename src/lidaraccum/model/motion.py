@@ -9,7 +9,7 @@ from torch import nn
 
 from lidaraccum.model.kabsch import exactly
 from lidaraccum.model.settings import NetworkSettings
-from lidaraccum.model.unet import UNet
+from lidaraccum.model.unet import UNet, linear
 
 _TIMES = 3
 _POINT_PLACE = 4
@@ -64,6 +64,7 @@ class MotionMap(nn.Module):
         super().__init__()
         channels = settings.temporal_channels
         self.halve = nn.Conv2d(settings.base_widths[0], channels, 2, stride=2)
+        nn.init.kaiming_normal_(self.halve.weight, nonlinearity="relu")
         self.clock = nn.Linear(_TIMES, channels)
         self.blocks = nn.ModuleList(
             _TemporalBlock(channels) for _ in range(settings.temporal_blocks)
@@ -194,17 +195,17 @@ class PointHead(nn.Module):
     def __init__(self, settings: NetworkSettings) -> None:
         super().__init__()
         channels = settings.point_channels
-        self.place = nn.Sequential(nn.Linear(_POINT_PLACE, 32), nn.ReLU(), nn.Linear(32, 64))
+        self.place = nn.Sequential(linear(_POINT_PLACE, 32), nn.ReLU(), linear(32, 64))
         read_channels = settings.motion_widths[0] + settings.base_widths[0]
         self.mix = nn.Sequential(
-            nn.Linear(read_channels + 64, channels),
+            linear(read_channels + 64, channels),
             nn.ReLU(),
-            nn.Linear(channels, channels),
+            linear(channels, channels),
             nn.ReLU(),
         )
         self.foreground = nn.Linear(channels, 1)
         self.dynamic = nn.Linear(channels, 1)
-        self.offset = nn.Sequential(nn.Linear(channels, 64), nn.ReLU(), nn.Linear(64, 2))
+        self.offset = nn.Sequential(linear(channels, 64), nn.ReLU(), nn.Linear(64, 2))
 
     def forward(
         self, motion: torch.Tensor, base: torch.Tensor, place: torch.Tensor

@@ -6,7 +6,9 @@ import torch
 from torch import nn
 
 from lidaraccum.model.batch import FrameTensors
+from lidaraccum.model.pooling import tallest
 from lidaraccum.model.settings import NetworkSettings
+from lidaraccum.model.unet import linear
 
 _POINT_FEATURES = 6
 _HEIGHT_SCALE_M = 2.0
@@ -21,17 +23,17 @@ class PillarEncoder(nn.Module):
 
     def __init__(self, settings: NetworkSettings) -> None:
         super().__init__()
-        self.inner = nn.Linear(_POINT_FEATURES, settings.point_hidden)
-        self.outer = nn.Linear(settings.point_hidden, settings.pillar_channels)
+        self.inner = linear(_POINT_FEATURES, settings.point_hidden)
+        self.outer = linear(settings.point_hidden, settings.pillar_channels)
+        self.normalise = nn.LayerNorm(settings.pillar_channels)
         self.project = nn.Linear(settings.pillar_channels, settings.base_widths[0])
 
     def forward(self, frames: FrameTensors) -> torch.Tensor:
         """Encode F frames."""
         hidden = torch.relu(self.inner(_point_features(frames)))
         hidden = torch.relu(self.outer(hidden))  # (P, C')
-        tallest = hidden.new_zeros(len(frames.pillar_cell), hidden.shape[1])
-        slots = frames.pillar[:, None].expand_as(hidden)
-        pillars = self.project(tallest.scatter_reduce(0, slots, hidden, "amax"))  # (V, C)
+        pooled = tallest(hidden, frames.pillar, len(frames.pillar_cell))
+        pillars = self.project(self.normalise(pooled).to(hidden.dtype))  # (V, C)
         area = frames.cells * frames.cells
         canvas = pillars.new_zeros(len(frames) * area, pillars.shape[1])
         canvas = canvas.index_copy(0, frames.pillar_frame * area + frames.pillar_cell, pillars)

@@ -46,9 +46,9 @@ class NetworkSettings:
     base_widths: tuple[int, ...] = (32, 64, 128, 192)
     ego_channels: int = 64
     ego_pillars: int = 1024
-    sinkhorn_rounds: int = 5
+    sinkhorn_rounds: int = 3
     fastest_mps: float = 40.0
-    rematch_m: tuple[float, ...] = (2.0, 0.7)
+    rematch_m: tuple[float, ...] = (3.0, 1.5, 0.7)
     temporal_channels: int = 48
     temporal_blocks: int = 2
     motion_widths: tuple[int, ...] = (64, 96, 128)

@@ -8,7 +8,9 @@ import torch
 from torch import nn
 
 from lidaraccum.model.kabsch import chain, compose, move
+from lidaraccum.model.pooling import tallest
 from lidaraccum.model.settings import NetworkSettings
+from lidaraccum.model.unet import linear
 
 ITERATIONS = 2
 """As in the paper's supplement; gradients do not flow from one into the other."""
@@ -109,16 +111,16 @@ class TubeNet(nn.Module):
     def __init__(self, settings: NetworkSettings) -> None:
         super().__init__()
         wide = settings.tube_channels
-        self.motion = nn.Sequential(nn.Linear(settings.point_channels, 64), nn.ReLU())
-        self.ego = nn.Sequential(nn.Linear(settings.base_widths[0], 64), nn.ReLU())
+        self.motion = nn.Sequential(linear(settings.point_channels, 64), nn.ReLU())
+        self.ego = nn.Sequential(linear(settings.base_widths[0], 64), nn.ReLU())
         self.place = nn.Sequential(
-            nn.Linear(4, 64), nn.ReLU(), nn.Linear(64, wide), nn.ReLU(), nn.Linear(wide, wide)
+            linear(4, 64), nn.ReLU(), linear(64, wide), nn.ReLU(), linear(wide, wide)
         )
         self.regress = nn.Sequential(
-            nn.Linear(128 + 2 * wide + 1, 256), nn.ReLU(), nn.Linear(256, 128), nn.ReLU()
+            linear(128 + 2 * wide + 1, 256), nn.ReLU(), linear(256, 128), nn.ReLU()
         )
         self.last = nn.Linear(128, 7)
-        nn.init.normal_(self.last.weight, std=1e-3)
+        nn.init.normal_(self.last.weight, std=1e-5)
         nn.init.zeros_(self.last.bias)  # the identity: see `_identity`
 
     def forward(self, tubes: Tubes, motion: torch.Tensor, base: torch.Tensor) -> TubeMotions:
@@ -126,8 +128,8 @@ class TubeNet(nn.Module):
         count, span = tubes.counts.shape
         general = torch.cat(
             [
-                _tallest(self.motion(motion).float(), tubes.instance, count),
-                _tallest(self.ego(base).float(), tubes.instance, count),
+                tallest(self.motion(motion).float(), tubes.instance, count),
+                tallest(self.ego(base).float(), tubes.instance, count),
             ],
             dim=1,
         )
@@ -152,7 +154,7 @@ class TubeNet(nn.Module):
         """(K, T, 7) quaternion less the identity, and shift, of this iteration."""
         count, span = tubes.counts.shape
         place = self.place(torch.cat([moved, tubes.seconds[:, None]], dim=1))
-        summary = _tallest(
+        summary = tallest(
             torch.relu(place).float(), tubes.instance * span + tubes.time, count * span
         ).view(count, span, -1)
         rows = torch.arange(count, device=moved.device)
@@ -174,12 +176,6 @@ def _identity(numbers: torch.Tensor) -> torch.Tensor:
     one = torch.zeros_like(numbers[..., :4])
     one[..., 0] = 1.0
     return one
-
-
-def _tallest(values: torch.Tensor, slot: torch.Tensor, count: int) -> torch.Tensor:
-    """Maximum (count, C) over the values (Q, C), 0 or more, of each slot; 0 where there is none."""
-    start = values.new_zeros(count, values.shape[1])
-    return start.scatter_reduce(0, slot[:, None].expand_as(values), values, "amax")
 
 
 def _move_points(total: torch.Tensor, tubes: Tubes) -> torch.Tensor:

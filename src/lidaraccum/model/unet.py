@@ -1,4 +1,4 @@
-"""A small two-dimensional U-Net without normalisation: skips are added, not stacked."""
+"""A small two-dimensional U-Net: skips are added, not stacked; normalised once, at its end."""
 
 from __future__ import annotations
 
@@ -9,11 +9,23 @@ import torch
 from torch import nn
 
 
+FAINT = 0.01
+"""Variance below which a cell is empty rather than faint, and is not blown up."""
+
+
 def convolution(inputs: int, outputs: int, stride: int = 1) -> nn.Conv2d:
     """A 3 x 3 convolution that keeps the size (or halves it), started for a ReLU after it."""
     layer = nn.Conv2d(inputs, outputs, 3, stride=stride, padding=1)
     nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
     nn.init.constant_(cast("torch.Tensor", layer.bias), 0.0)
+    return layer
+
+
+def linear(inputs: int, outputs: int) -> nn.Linear:
+    """A layer started for a ReLU after it: signals keep their size through many of them."""
+    layer = nn.Linear(inputs, outputs)
+    nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
+    nn.init.zeros_(layer.bias)
     return layer
 
 
@@ -49,8 +61,11 @@ class _Up(nn.Module):
 class UNet(nn.Module):
     """Maps (N, C, H, W) to (N, widths[0], H, W); H and W are multiples of 2^(levels - 1).
 
-    Source: the paper's supplement, figure "Network"; no normalisation as there, sums for stacks
-    and fewer channels for the sake of processors.
+    The features of each cell are normalised over their channels, so that every head starts from
+    signals of size 1 however much of the map is empty.
+
+    Source: the paper's supplement, figure "Network"; sums for stacks and fewer channels for the
+    sake of processors; the normalisation is ours.
     """
 
     def __init__(self, inputs: int, widths: tuple[int, ...]) -> None:
@@ -59,6 +74,7 @@ class UNet(nn.Module):
         pairs = list(pairwise(widths))
         self.downs = nn.ModuleList(_Down(fine, coarse) for fine, coarse in pairs)
         self.ups = nn.ModuleList(_Up(coarse, fine) for fine, coarse in reversed(pairs))
+        self.normalise = nn.LayerNorm(widths[0], eps=FAINT)
 
     def forward(self, maps: torch.Tensor) -> torch.Tensor:
         """Features at the resolution of the maps."""
@@ -69,4 +85,5 @@ class UNet(nn.Module):
             level = down(level)
         for up in self.ups:
             level = up(level, skipped.pop())
-        return level
+        cells: torch.Tensor = self.normalise(level.permute(0, 2, 3, 1))
+        return cells.to(level.dtype).permute(0, 3, 1, 2)
