@@ -7,9 +7,12 @@ from dataclasses import dataclass, replace
 from lidaraccum.errors import SettingsError
 
 SURE = 0.8
-TRUSTED_SHARE = 0.5
-"""Where a proposer is so sure that something moves, this share of the margin and of the way is
-enough."""
+TRUSTED_MARGIN = 0.2
+TRUSTED_COST = 0.65
+TRUSTED_SHARE = 0.8
+TRUSTED_WAY = 0.5
+"""Where a proposer is so sure that something moves, this share of the margin is enough and this
+cost is allowed if it is less than this share of standing still; so is this share of the way."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,7 @@ class MotionSettings:
         truncation_m: Distance at which a point has no partner.
         margin: How much less than standing still a motion must cost.
         max_cost: A motion that costs more explains nothing.
+        max_share: Nor does one that costs more than this share of what standing still costs.
         min_through: Share of its points that the other frames must have seen through, were it
             standing still.
         sure_margin: With so much margin one window is enough; with less, two must agree.
@@ -58,6 +62,7 @@ class MotionSettings:
     truncation_m: float = 0.3
     margin: float = 0.3
     max_cost: float = 0.5
+    max_share: float = 1.0
     min_through: float = 0.15
     sure_margin: float = 0.5
     box_growth: float = 1.5
@@ -80,8 +85,10 @@ class MotionSettings:
             return self
         return replace(
             self,
-            margin=TRUSTED_SHARE * self.margin,
-            min_shift_m=TRUSTED_SHARE * self.min_shift_m,
+            margin=TRUSTED_MARGIN * self.margin,
+            max_cost=max(TRUSTED_COST, self.max_cost),
+            max_share=TRUSTED_SHARE,
+            min_shift_m=TRUSTED_WAY * self.min_shift_m,
             min_through=-1.0,
         )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,8 @@ standing costs it so much less than moving."""
 SAME_GAP_M = 0.8
 SAME_SPEED_MPS = 0.8
 """Two movers nearer than this and with velocities as like as this are one."""
+
+_NONE = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +106,8 @@ def find_objects(
             stamp = frames[lead.suspect.frame].stamp
             known = _expected_velocities(lead.suspect, stamp, expected)
             proposals = np.concatenate([known, lead.velocities])
-            claimed.add(explain(lead.suspect, proposals, frames, settings.trusting(lead.trust)))
+            found = explain(lead.suspect, proposals, frames, settings.trusting(lead.trust))
+            claimed.add(_agreed(found, lead, frames) if found else None)
     suspects = find_suspects(frames, settings)
     for suspect in suspects:
         if claimed.has(suspect):
@@ -116,6 +119,22 @@ def find_objects(
             found = explain(suspect, proposals, frames, settings)
         claimed.add(found)
     return join_parts(claimed.objects, frames)
+
+
+def _agreed(found: WindowObject, lead: Lead, frames: Sequence[SightedFrame]) -> WindowObject:
+    """The mover with those of its points that its proposer meant or that free space accuses.
+
+    Little evidence was asked of the motion, so what stands beside it must not come along.
+    """
+    picked = {}
+    for frame in frames:
+        if frame.index in found.picked:
+            own = found.picked[frame.index]
+            meant = np.isin(own, lead.picked.get(frame.index, _NONE))
+            kept = own[meant | (frame.through[own] > frame.met[own])]
+            if len(kept):
+                picked[frame.index] = kept
+    return replace(found, picked=picked)
 
 
 class _Claimed:
@@ -208,6 +227,7 @@ def _is_motion(
         and way > settings.min_shift_m
         and verdict.cost[0] - verdict.cost[best] > settings.margin
         and verdict.cost[best] < settings.max_cost
+        and verdict.cost[best] < settings.max_share * verdict.cost[0]
         and verdict.through[0] > settings.min_through
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,11 +43,14 @@ class Lead:
         suspect: Its points in one frame.
         velocities: (H, 3) m/s, world: how it may move.
         trust: 0..1: how sure the proposer is that it moves.
+        picked: By frame index in the sequence: all that the proposer takes for its points, which
+            of that frame's obstacles (K,).
     """
 
     suspect: Suspect
     velocities: NDArray[np.float64]
     trust: float
+    picked: Mapping[int, NDArray[np.int64]]
 
 
 def find_suspects(frames: Sequence[SightedFrame], settings: MotionSettings) -> list[Suspect]:

@@ -77,7 +77,7 @@ class Tube:
         place = max(shown, key=lambda place: len(self.picked[window[place].index]))
         picked = self.picked[window[place].index]
         suspect = Suspect(place, picked, window[place].world(picked).mean(axis=0))
-        return Lead(suspect, self.velocities, self.trust)
+        return Lead(suspect, self.velocities, self.trust, self.picked)
 
 
 def find_tubes(
