@@ -169,3 +169,10 @@ def test_a_short_sequence_gives_shorter_windows_and_one_frame_none(toy: ModuleTy
 def test_settings_that_make_no_window_are_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(SettingsError):
         WindowSettings(**wrong)
+
+
+@pytest.mark.parametrize(("longest_s", "most"), [(0.35, 4), (0.1, 2), (0.01, 2), (9.0, 6)])
+def test_a_window_spans_no_longer_than_asked(toy: ModuleType, longest_s: float, most: int) -> None:
+    settings = replace(toy.WINDOWS, lengths=(6,), longest_s=longest_s, largest_step=1)
+    windows = toy.CarParks(settings=settings).windows(0)
+    assert {len(window.frames) for window in windows} == {most}

@@ -24,6 +24,8 @@ class WindowSettings:
         lengths: Frames a window may have, each as likely as the others: name one twice to have it
             twice as often.
         largest_step: Every 1st to this-th frame of the drive makes the window.
+        longest_s: Seconds a window spans at most, if it has more than two frames: in a second a
+            fast car leaves most of the grid behind, and there is nothing left to compare.
         windows_per_drive: Windows cut out of one drive, overlapping, each augmented its own way.
         drive_frames: Frames of a simulated drive.
         augment: How windows are changed.
@@ -32,6 +34,7 @@ class WindowSettings:
     extent_m: float = 32.0
     lengths: tuple[int, ...] = (2, 3, 4, 5, 5, 5, 5, 6, 8)
     largest_step: int = 2
+    longest_s: float = 0.8
     windows_per_drive: int = 4
     drive_frames: int = 10
     augment: AugmentSettings = field(default_factory=AugmentSettings)
@@ -59,7 +62,7 @@ def cut_windows(
     """
     if len(sequence) < 2:
         raise InputError(f"{sequence.name} has {len(sequence)} frame, too few for a window")
-    places = [_draw_place(len(sequence), settings, rng) for _ in range(settings.windows_per_drive)]
+    places = [_draw_place(sequence, settings, rng) for _ in range(settings.windows_per_drive)]
     read: dict[int, LabelledFrame] = {}
     for index in sorted({index for place in places for index in place}):
         read[index] = (sequence[index], sequence.labels(index))
@@ -71,11 +74,15 @@ def cut_windows(
     return windows
 
 
-def _draw_place(frames: int, settings: WindowSettings, rng: np.random.Generator) -> Sequence[int]:
-    """Indices of one window: so many frames, so far apart, as the sequence allows."""
+def _draw_place(
+    sequence: LabelledSequence, settings: WindowSettings, rng: np.random.Generator
+) -> Sequence[int]:
+    """Indices of one window: so many frames, so far apart, as sequence and settings allow."""
+    frames = len(sequence)
     length = min(int(rng.choice(settings.lengths)), frames)
     longest = max(1, (frames - 1) // (length - 1))
     step = int(rng.integers(1, min(settings.largest_step, longest) + 1))
+    length = min(length, max(2, 1 + int(settings.longest_s * sequence.rate_hz / step + 1e-6)))
     first = int(rng.integers(0, frames - (length - 1) * step))
     return range(first, first + length * step, step)
 
