@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.geometry import rigid
+from lidaraccum.pipeline.courses import turned
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.object_ids import ObjectIds
@@ -42,6 +43,7 @@ class Track:
         margin: The best margin over standing still.
         picked: By frame index: its obstacles (K,) in frames that are not finished.
         velocities: By frame index: m/s, world, in frames that are not finished.
+        turns: By frame index: radians a second, in frames that are not finished.
         shape: All it has shown, in its own coordinates; None before its first finished frame.
         world_from_object: (4, 4) in its last finished frame.
         last_index: That frame.
@@ -57,6 +59,7 @@ class Track:
     margin: float = 0.0
     picked: dict[int, NDArray[np.int64]] = field(default_factory=dict)
     velocities: dict[int, NDArray[np.float64]] = field(default_factory=dict)
+    turns: dict[int, float] = field(default_factory=dict)
     shape: ObjectShape | None = None
     world_from_object: rigid.Pose = field(default_factory=lambda: np.eye(4))
     last_index: int = -1
@@ -84,12 +87,15 @@ class Track:
                 continue
             known = self.picked.get(frame.index)
             self.picked[frame.index] = picked if known is None else np.union1d(known, picked)
-            self.velocities[frame.index] = found.velocity
+            angle = found.turn * (frame.stamp - found.stamp)
+            self.velocities[frame.index] = turned(found.velocity, angle)
+            self.turns[frame.index] = found.turn
 
     def forget(self, index: int) -> None:
         """Drop what is kept for a frame that is finished."""
         self.picked.pop(index, None)
         self.velocities.pop(index, None)
+        self.turns.pop(index, None)
 
 
 class Association:

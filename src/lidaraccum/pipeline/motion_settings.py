@@ -9,7 +9,7 @@ from lidaraccum.errors import SettingsError
 SURE = 0.8
 TRUSTED_MARGIN = 0.2
 TRUSTED_COST = 0.65
-TRUSTED_SHARE = 0.8
+TRUSTED_SHARE = 0.85
 TRUSTED_WAY = 0.5
 """Where a proposer is so sure that something moves, this share of the margin is enough and this
 cost is allowed if it is less than this share of standing still; so is this share of the way."""

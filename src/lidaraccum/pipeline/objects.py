@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from lidaraccum.geometry import rigid
 from lidaraccum.geometry.voxel import thin
+from lidaraccum.pipeline.courses import course
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.hypotheses import propose
 from lidaraccum.pipeline.motion_settings import MotionSettings
@@ -72,10 +73,11 @@ class WindowObject:
 
     Attributes:
         picked: By frame index in the sequence: which of that frame's obstacles (K,).
-        velocity: (3,) m/s, world.
+        velocity: (3,) m/s, world, at ``stamp``.
         centre: (3,) metres, world, of its points in the frame at ``stamp``.
         stamp: Seconds.
         margin: How much cheaper this motion is than standing still.
+        turn: Radians a second, of it and of its velocity.
     """
 
     picked: Mapping[int, NDArray[np.int64]]
@@ -83,6 +85,7 @@ class WindowObject:
     centre: NDArray[np.float64]
     stamp: float
     margin: float
+    turn: float = 0.0
 
 
 def find_objects(
@@ -106,7 +109,9 @@ def find_objects(
             stamp = frames[lead.suspect.frame].stamp
             known = _expected_velocities(lead.suspect, stamp, expected)
             proposals = np.concatenate([known, lead.velocities])
-            found = explain(lead.suspect, proposals, frames, settings.trusting(lead.trust))
+            turns = np.concatenate([np.zeros(len(known)), lead.turns])
+            needed = settings.trusting(lead.trust)
+            found = explain(lead.suspect, proposals, frames, needed, turns)
             claimed.add(_agreed(found, lead, frames) if found else None)
     suspects = find_suspects(frames, settings)
     for suspect in suspects:
@@ -177,6 +182,7 @@ def explain(
     proposals: NDArray[np.float64],
     frames: Sequence[SightedFrame],
     settings: MotionSettings,
+    turns: NDArray[np.float64] | None = None,
 ) -> WindowObject | None:
     """The suspect as a mover, or None when standing still explains its points as well.
 
@@ -185,31 +191,37 @@ def explain(
         proposals: (H, 3) velocities worth trying, m/s, world.
         frames: The window.
         settings: What counts as a mover.
+        turns: (H,) radians a second, worth trying with them; straight on when None.
     """
     own = frames[suspect.frame]
+    turns = np.zeros(len(proposals)) if turns is None else turns
     still = np.zeros((1, 3))
     probes = frames[:: max(1, (len(frames) - 1) // (PROBES - 1))]
     rough = make_template(own, suspect.picked, FIRST_LOOK_POINTS)
     if len(proposals) == 0 or judge(rough, still, probes, settings).cost[0] < settings.margin:
         return None
-    order = np.argsort(judge(rough, proposals, probes, settings).cost, kind="stable")
+    order = np.argsort(judge(rough, proposals, probes, settings, turns).cost, kind="stable")
     template = make_template(own, suspect.picked, TEMPLATE_POINTS)
+    chosen = order[:REFINED_HYPOTHESES]
     refined = [
-        refine_velocity(rough, proposals[choice], probes, settings)
-        for choice in order[:REFINED_HYPOTHESES]
+        refine_velocity(rough, proposals[choice], probes, settings, float(turns[choice]))
+        for choice in chosen
     ]
     rivals = np.concatenate([still, refined])
-    verdict = judge(template, rivals, probes, settings)
+    turning = np.concatenate([[0.0], turns[chosen]])
+    verdict = judge(template, rivals, probes, settings, turning)
     best = int(verdict.cost.argmin())
     if not _is_motion(best, rivals, verdict, frames, settings):
         return None
-    picked = gather(suspect, rivals[best], frames)
+    turn = float(turning[best])
+    picked = gather(suspect, rivals[best], frames, turn)
     return WindowObject(
         picked=without_standing(picked, rivals[best], frames, settings),
         velocity=rivals[best],
         centre=suspect.centre,
         stamp=own.stamp,
         margin=float(verdict.cost[0] - verdict.cost[best]),
+        turn=turn,
     )
 
 
@@ -233,7 +245,10 @@ def _is_motion(
 
 
 def gather(
-    suspect: Suspect, velocity: NDArray[np.float64], frames: Sequence[SightedFrame]
+    suspect: Suspect,
+    velocity: NDArray[np.float64],
+    frames: Sequence[SightedFrame],
+    turn: float = 0.0,
 ) -> dict[int, NDArray[np.int64]]:
     """By frame index: the obstacles (K,) of each frame that the moved suspect lies on."""
     own = frames[suspect.frame]
@@ -242,7 +257,10 @@ def gather(
     for frame in frames:
         if frame is own:
             continue
-        moved = world + velocity * (frame.stamp - own.stamp)
+        seconds = frame.stamp - own.stamp
+        moved = world + velocity * seconds
+        if turn:
+            moved = rigid.transform(course(suspect.centre, velocity, turn, seconds), world)
         local = rigid.transform(frame.sensor_from_world, moved)
         picked = _points_at(frame, frame.places(local, heights))
         if len(picked):
@@ -282,7 +300,8 @@ def without_standing(
         doubtful = mine[(frame.through[mine] == 0) & (frame.met[mine] > 0)]
         if len(doubtful) > STANDING_SHARE * len(mine):
             sample = doubtful[thin(frame.points[doubtful], 0.2)]
-            template = Template(frame.world(sample), frame.heights[sample], frame.stamp)
+            world = frame.world(sample)
+            template = Template(world, frame.heights[sample], frame.stamp, world.mean(axis=0))
             rivals = np.stack([np.zeros(3), velocity])
             cost, _ = judge_points(template, rivals, frames, settings)
             stands = cost[0] + STANDING_MARGIN < cost[1]
@@ -323,4 +342,4 @@ def _united(whole: WindowObject, part: WindowObject) -> WindowObject:
     picked = dict(whole.picked)
     for index, rows in part.picked.items():
         picked[index] = np.union1d(picked[index], rows) if index in picked else rows
-    return WindowObject(picked, whole.velocity, whole.centre, whole.stamp, whole.margin)
+    return replace(whole, picked=picked)

@@ -10,6 +10,7 @@ from lidaraccum.data.accumulation import BACKGROUND, MOVING, STILL
 from lidaraccum.data.perceived import PerceivedFrame
 from lidaraccum.geometry import rigid
 from lidaraccum.pipeline.association import Track
+from lidaraccum.pipeline.courses import course, turned
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.shape import ObjectShape
 
@@ -119,8 +120,11 @@ def _follow(track: Track, frame: SightedFrame, picked: NDArray[np.int64]) -> Non
         pose[:2, :2] = [[cosine, -sine], [sine, cosine]]
         track.shape = ObjectShape(rigid.transform(rigid.invert(pose), world))
     else:
-        shift = velocity * (frame.stamp - track.last_stamp)
-        pose = rigid.translation(shift) @ track.world_from_object
+        # Back from this frame's velocity to that of the last, then on along the course.
+        seconds, turn = frame.stamp - track.last_stamp, track.turns[frame.index]
+        before = turned(velocity, -turn * seconds)
+        origin = track.world_from_object[:3, 3]
+        pose = course(origin, before, turn, seconds) @ track.world_from_object
         own = rigid.transform(rigid.invert(pose), world)
         fit = track.shape.fit(own)
         pose = pose @ rigid.invert(fit.correction)

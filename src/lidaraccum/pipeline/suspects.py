@@ -41,7 +41,8 @@ class Lead:
 
     Attributes:
         suspect: Its points in one frame.
-        velocities: (H, 3) m/s, world: how it may move.
+        velocities: (H, 3) m/s, world: how its centre may move.
+        turns: (H,) radians a second: how it may turn meanwhile.
         trust: 0..1: how sure the proposer is that it moves.
         picked: By frame index in the sequence: all that the proposer takes for its points, which
             of that frame's obstacles (K,).
@@ -49,6 +50,7 @@ class Lead:
 
     suspect: Suspect
     velocities: NDArray[np.float64]
+    turns: NDArray[np.float64]
     trust: float
     picked: Mapping[int, NDArray[np.int64]]
 
@@ -96,11 +98,13 @@ class Template:
         world: (P, 3) metres, world, at ``stamp``.
         heights: (P,) metres above the ground.
         stamp: Seconds.
+        pivot: (3,) metres, world: the centre of the cluster, about which it turns.
     """
 
     world: NDArray[np.float64]
     heights: NDArray[np.float64]
     stamp: float
+    pivot: NDArray[np.float64]
 
 
 def make_template(frame: SightedFrame, picked: NDArray[np.int64], count: int) -> Template:
@@ -109,4 +113,5 @@ def make_template(frame: SightedFrame, picked: NDArray[np.int64], count: int) ->
     if len(kept) > count:
         kept = kept[np.linspace(0, len(kept) - 1, count).astype(np.int64)]
     chosen = picked[kept]
-    return Template(frame.world(chosen), frame.heights[chosen], frame.stamp)
+    centre = frame.world(picked).mean(axis=0)
+    return Template(frame.world(chosen), frame.heights[chosen], frame.stamp, centre)

@@ -13,6 +13,7 @@ from lidaraccum.data.frame import Frame
 from lidaraccum.geometry import rigid
 from lidaraccum.geometry.clustering import dense_groups
 from lidaraccum.model.reading import ObjectReading, WindowReading
+from lidaraccum.pipeline.courses import turned
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.suspects import Lead, Suspect
@@ -61,12 +62,17 @@ class Tube:
 
     Attributes:
         picked: By frame index in the sequence: which of that frame's obstacles (K,).
-        velocities: (H, 3) m/s, world, level: how it may move.
+        velocity: (3,) m/s, world, level: of its points' centre from frame to frame; NaN in one.
+        anchor_from_then: By frame index: the motion (4, 4), world, that the network says took it
+            from then to its place in its anchor frame; none where it said nothing.
+        stamps: By frame index: seconds.
         trust: Mean probability that its points move.
     """
 
     picked: Mapping[int, NDArray[np.int64]]
-    velocities: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    anchor_from_then: Mapping[int, rigid.Pose]
+    stamps: Mapping[int, float]
     trust: float
 
     def lead(self, window: Sequence[SightedFrame]) -> Lead | None:
@@ -77,7 +83,40 @@ class Tube:
         place = max(shown, key=lambda place: len(self.picked[window[place].index]))
         picked = self.picked[window[place].index]
         suspect = Suspect(place, picked, window[place].world(picked).mean(axis=0))
-        return Lead(suspect, self.velocities, self.trust, self.picked)
+        velocities, turns = self._courses(window[place].index, suspect.centre)
+        return Lead(suspect, velocities, turns, self.trust, self.picked)
+
+    def _courses(
+        self, index: int, centre: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Velocities (H, 3) of a centre (3,) in a frame, and turns (H,) that go with them."""
+        ways = [(self.velocity, 0.0)] if np.isfinite(self.velocity).all() else []
+        if index in self.anchor_from_then:
+            ways += self._regressed(index, centre)
+        velocities = np.array([velocity for velocity, _ in ways]).reshape(-1, 3)
+        return velocities, np.array([turn for _, turn in ways])
+
+    def _regressed(
+        self, index: int, centre: NDArray[np.float64]
+    ) -> list[tuple[NDArray[np.float64], float]]:
+        """What the network's motions of this frame against all others come to."""
+        lags, shifts, angles = [], [], []
+        for other, anchor_from_then in self.anchor_from_then.items():
+            if other == index:
+                continue
+            motion = rigid.invert(anchor_from_then) @ self.anchor_from_then[index]
+            lags.append(self.stamps[other] - self.stamps[index])
+            shifts.append(rigid.transform(motion, centre[None])[0] - centre)
+            angles.append(np.arctan2(motion[1, 0], motion[0, 0]))
+        if not lags:
+            return []
+        lag, shift = np.array(lags), np.array(shifts) * (1.0, 1.0, 0.0)
+        turn = float(lag @ np.array(angles) / (lag @ lag))
+        # Each way is the chord of an arc; turned back by half its angle it tells the start.
+        arcs = np.array(
+            [turned(one, -0.5 * turn * gap) for one, gap in zip(shift, lag, strict=True)]
+        )
+        return [(lag @ shift / (lag @ lag), 0.0), (lag @ arcs / (lag @ lag), turn)]
 
 
 def find_tubes(
@@ -95,23 +134,16 @@ def find_tubes(
         for place, picked in group.items():
             instances[place][frames[place].rows[picked]] = number
     motions = reader.track(reading, instances)
-    tubes = []
-    for number, group in enumerate(groups, start=1):
-        velocities = [_centroid_velocity(group, frames)]
-        velocities += _regressed_velocities(number, group, frames, reading, motions)
-        fast = np.array([one for one in velocities if np.isfinite(one).all()]).reshape(-1, 3)
-        sure = [
-            reading.frames[place].dynamic[frames[place].rows[picked]]
-            for place, picked in group.items()
-        ]
-        tubes.append(
-            Tube(
-                {frames[place].index: picked for place, picked in group.items()},
-                fast,
-                float(np.concatenate(sure).mean()),
-            )
+    return [
+        Tube(
+            picked={frames[place].index: picked for place, picked in group.items()},
+            velocity=_centroid_velocity(group, frames),
+            anchor_from_then=_world_motions(number, group, frames, reading.target, motions),
+            stamps={frames[place].index: frames[place].stamp for place in group},
+            trust=_trust(group, frames, reading),
         )
-    return tubes
+        for number, group in enumerate(groups, start=1)
+    ]
 
 
 _Group = dict[int, NDArray[np.int64]]
@@ -160,37 +192,26 @@ def _centroid_velocity(group: _Group, frames: Sequence[SightedFrame]) -> NDArray
     return ((weight * seconds) @ centres / spread) * (1.0, 1.0, 0.0)
 
 
-def _regressed_velocities(
+def _world_motions(
     number: int,
     group: _Group,
     frames: Sequence[SightedFrame],
-    reading: WindowReading,
+    target: int,
     motions: ObjectReading,
-) -> list[NDArray[np.float64]]:
-    """Velocities (3,) by TubeNet's motions: one for all frames, one for the farthest in time."""
+) -> dict[int, rigid.Pose]:
+    """The network's motions (4, 4) of a group to its anchor, world, by frame index."""
     rows = np.flatnonzero(motions.ids == number)
     if len(rows) == 0:
-        return []
-    row = int(rows[0])
-    world_from_target = frames[reading.target].world_from_sensor
-    anchor = frames[int(motions.anchor[row])].stamp
-    shifts, seconds, weight = [], [], []
-    for place, picked in group.items():
-        lag = anchor - frames[place].stamp
-        if lag == 0 or not motions.seen[row, place]:
-            continue
-        anchor_from_now = (
-            world_from_target
-            @ motions.target_from_aligned[row, place]
-            @ frames[reading.target].sensor_from_world
-        )
-        centre = frames[place].world(picked).mean(axis=0, keepdims=True)
-        shifts.append((rigid.transform(anchor_from_now, centre) - centre)[0])
-        seconds.append(lag)
-        weight.append(len(picked))
-    if not shifts:
-        return []
-    shift, lags = np.array(shifts) * (1.0, 1.0, 0.0), np.array(seconds)
-    weights = np.array(weight) * lags
-    farthest = int(np.abs(lags).argmax())
-    return [weights @ shift / (weights @ lags), shift[farthest] / lags[farthest]]
+        return {}
+    there, back = frames[target].world_from_sensor, frames[target].sensor_from_world
+    return {
+        frames[place].index: there @ motions.target_from_aligned[rows[0], place] @ back
+        for place in group
+        if motions.seen[rows[0], place]
+    }
+
+
+def _trust(group: _Group, frames: Sequence[SightedFrame], reading: WindowReading) -> float:
+    """Mean probability that a group's points move."""
+    sure = [reading.frames[place].dynamic[frames[place].rows[own]] for place, own in group.items()]
+    return float(np.concatenate(sure).mean())

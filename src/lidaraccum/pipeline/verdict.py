@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.geometry import rigid
+from lidaraccum.pipeline.courses import course, turned
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.suspects import Template
@@ -39,9 +40,13 @@ def judge(
     velocities: NDArray[np.float64],
     frames: Sequence[SightedFrame],
     settings: MotionSettings,
+    turns: NDArray[np.float64] | None = None,
 ) -> Verdict:
-    """Try velocities (H, 3), m/s, world, on a cluster, in all other frames of its window."""
-    cost, through = judge_points(template, velocities, frames, settings)
+    """Try velocities (H, 3), m/s, world, on a cluster, in all other frames of its window.
+
+    ``turns`` (H,), radians a second, are tried with them; straight on when None.
+    """
+    cost, through = judge_points(template, velocities, frames, settings, turns)
     return Verdict(cost=cost.mean(axis=1), through=through.mean(axis=1))
 
 
@@ -50,9 +55,11 @@ def judge_points(
     velocities: NDArray[np.float64],
     frames: Sequence[SightedFrame],
     settings: MotionSettings,
+    turns: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """As `judge`, point by point: costs (H, P) and shares of frames that saw through (H, P)."""
     hypotheses, count = len(velocities), len(template.world)
+    turns = np.zeros(hypotheses) if turns is None else turns
     heights = np.tile(template.heights, hypotheses)
     costs, passed = [], []
     for frame in frames:
@@ -60,6 +67,9 @@ def judge_points(
         if seconds == 0:
             continue
         moved = template.world[None] + velocities[:, None] * seconds
+        for row in np.flatnonzero(turns):
+            motion = course(template.pivot, velocities[row], float(turns[row]), seconds)
+            moved[row] = rigid.transform(motion, template.world)
         local = rigid.transform(frame.sensor_from_world, moved.reshape(-1, 3))
         gate = settings.truncation_m
         distance, _ = frame.tree.query(frame.places(local, heights), distance_upper_bound=gate)
@@ -77,11 +87,12 @@ def refine_velocity(
     velocity: NDArray[np.float64],
     frames: Sequence[SightedFrame],
     settings: MotionSettings,
+    turn: float = 0.0,
 ) -> NDArray[np.float64]:
     """The velocity (3,) that best takes a cluster onto all other frames together, from a start.
 
     ICP with one unknown for the whole window: each frame asks for a shift, its points in number
-    and its distance in time are its weight.
+    and its distance in time are its weight. ``turn``, radians a second, stays as it is.
     """
     refined = velocity.copy()
     for _ in range(REFINING_STEPS):
@@ -90,7 +101,11 @@ def refine_velocity(
             seconds = frame.stamp - template.stamp
             if seconds == 0:
                 continue
-            local = rigid.transform(frame.sensor_from_world, template.world + refined * seconds)
+            moved = template.world + refined * seconds
+            if turn:
+                motion = course(template.pivot, refined, turn, seconds)
+                moved = rigid.transform(motion, template.world)
+            local = rigid.transform(frame.sensor_from_world, moved)
             distance, partner = frame.tree.query(
                 frame.places(local, template.heights),
                 distance_upper_bound=2 * settings.truncation_m,
@@ -101,7 +116,7 @@ def refine_velocity(
             trust = 1 / (0.1 + distance[hit])
             lag = (frame.near_points[partner[hit]] - local[hit]) * trust[:, None]
             shift = frame.world_from_sensor[:3, :3] @ (lag.sum(axis=0) / trust.sum())
-            asked += hit.sum() * seconds * shift
+            asked += hit.sum() * seconds * turned(shift, -0.5 * turn * seconds)
             weight += hit.sum() * seconds**2
         if weight == 0:
             break
