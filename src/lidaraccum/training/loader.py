@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import threading
 from collections.abc import Iterator
-from multiprocessing import parent_process
-from multiprocessing.connection import wait
 
-import torch
 from torch.utils.data import DataLoader, Dataset
 
 from lidaraccum.training.dataset import WindowSource
 from lidaraccum.training.window import TrainingWindow
+from lidaraccum.training.workers import begin
 
 _AHEAD = 2
 
@@ -35,19 +30,7 @@ def _as_it_is(drive: list[TrainingWindow]) -> list[TrainingWindow]:
 
 
 def _begin(_worker: int) -> None:
-    torch.set_num_threads(1)
-    # Ctrl-C and SIGTERM reach the whole process group, but how a run ends is for the trainer.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)
-    threading.Thread(target=_end_with_the_trainer, daemon=True).start()
-
-
-def _end_with_the_trainer() -> None:
-    """A killed trainer reads no more: a worker that still has windows to hand on would wait."""
-    trainer = parent_process()
-    if trainer is not None:
-        wait([trainer.sentinel])
-        os._exit(1)
+    begin()
 
 
 def batches_from(

@@ -63,15 +63,14 @@ class Losses:
     offset: torch.Tensor
     objects: torch.Tensor
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Of the terms, in order."""
-        return tuple(item.name for item in fields(self))
-
     def numbers(self) -> list[float]:
         """The terms as floats, in order, in one transfer."""
-        terms = [getattr(self, name) for name in self.names]
+        terms = [getattr(self, name) for name in LOSS_NAMES]
         return torch.stack(terms).detach().cpu().tolist()
+
+
+LOSS_NAMES = tuple(item.name for item in fields(Losses))
+"""Of the terms, in the order of `Losses.numbers`."""
 
 
 def objective(

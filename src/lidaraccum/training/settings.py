@@ -62,6 +62,8 @@ class TrainSettings:
         hours: Stop after so long, counted over all resumptions; whichever comes first.
         start_from: Weights to go on from (fine-tuning), a checkpoint of the package.
         workers: Processes that make windows; 0 makes them in the trainer's own.
+        processes: Processes that learn, each a share of the batch with one thread; on a CPU, as
+            many as there are cores is fastest, with as large a batch or a multiple of it.
         threads: CPU threads of the trainer; 0 leaves torch's choice.
         device: ``auto``, ``cpu`` or ``cuda``.
         checkpoint_minutes: Time between checkpoints: what a kill loses at most.
@@ -80,6 +82,7 @@ class TrainSettings:
     hours: float | None = None
     start_from: Path | None = None
     workers: int = 1
+    processes: int = 1
     threads: int = 0
     device: Literal["auto", "cpu", "cuda"] = "auto"
     checkpoint_minutes: float = 5.0
@@ -92,6 +95,8 @@ class TrainSettings:
             raise SettingsError("training needs an end", hint="give steps or hours")
         if self.device not in ("auto", "cpu", "cuda"):
             raise SettingsError(f"the device is auto, cpu or cuda, not {self.device!r}")
+        if self.processes < 1 or (self.processes > 1 and self.device == "cuda"):
+            raise SettingsError("processes is at least 1, and 1 on an accelerator")
         if min(self.workers, self.checkpoint_minutes, self.keep_drives) < 0 or self.log_steps < 1:
             raise SettingsError(
                 "workers, checkpoint_minutes, keep_drives and log_steps cannot be negative"

@@ -15,13 +15,13 @@ import torch
 from lidaraccum.errors import OutputExistsError, SettingsError
 from lidaraccum.model.checkpoint import load_network
 from lidaraccum.model.network import build_network
-from lidaraccum.model.precision import inference
 from lidaraccum.model.settings import NetworkSettings
+from lidaraccum.training.crew import Crew
 from lidaraccum.training.dataset import SimulatedDrives, ValidationDrives, WindowSource
 from lidaraccum.training.journal import Journal
 from lidaraccum.training.kept import KeptDrives
 from lidaraccum.training.loader import batches_from
-from lidaraccum.training.objective import Losses, objective
+from lidaraccum.training.objective import LOSS_NAMES
 from lidaraccum.training.scores import Scores, score_network
 from lidaraccum.training.settings import OptimiserSettings, TrainSettings
 from lidaraccum.training.state import (
@@ -37,6 +37,8 @@ from lidaraccum.training.window import Batch, TrainingWindow, make_batch
 
 DRIVES_FOLDER = "drives"
 """Of a run's folder: drives that are kept."""
+
+_SEED_STRIDE = 1_000_003
 
 _log = logging.getLogger(__name__)
 
@@ -110,6 +112,7 @@ class _Run:
         if (out_dir / STATE_FILE).exists():
             restore_state(self.state, settings, out_dir)
             _log.info("resumed at step %d", self.state.step)
+        self.crew = Crew(self.state.network, settings.objective, settings.processes)
         network = self.state.network.settings
         self.source = source or _simulated_source(settings, network, out_dir)
         self.held_out = held_out or ValidationDrives(network, settings.windows.extent_m)
@@ -123,15 +126,12 @@ class _Run:
         settings, state = self.settings, self.state
         saved = time.monotonic()
         recent: list[list[float]] = []
-        names: tuple[str, ...] = ()
         batches = self._batches()
         while not self._is_over():
-            losses = self._step(make_batch(next(batches), self.device))
-            recent.append(losses.numbers())
-            names = losses.names
+            recent.append(self._step(next(batches)))
             self.watch.on_step(state.step, recent[-1][0])
             if state.step % settings.log_steps == 0 or self._is_over():
-                self._note_losses(names, recent)
+                self._note_losses(recent)
                 recent = []
             if settings.validate_steps and state.step % settings.validate_steps == 0:
                 self._validate()
@@ -166,15 +166,11 @@ class _Run:
         late = hours is not None and time.monotonic() - self.began >= 3600.0 * hours
         return late or self._spent() >= 1.0 or self.watch.wants_end()
 
-    def _step(self, batch: Batch) -> Losses:
+    def _step(self, windows: list[TrainingWindow]) -> list[float]:
         state, settings = self.state, self.settings
-        generator = torch.Generator().manual_seed(settings.seed * 1_000_003 + state.step)
         for group in state.optimiser.param_groups:
             group["lr"] = self._rate()
-        state.optimiser.zero_grad(set_to_none=True)
-        with inference(self.device):
-            losses = objective(state.network, batch, settings.objective, generator)
-        losses.total.backward()  # type: ignore[no-untyped-call]
+        losses = self.crew.learn(windows, settings.seed * _SEED_STRIDE + state.step)
         if clip_gradients(state.network, settings.optimiser.clip):
             state.optimiser.step()
         else:  # one window must not end a run of days
@@ -183,9 +179,9 @@ class _Run:
         _follow(state.average, state.network, settings.optimiser.average, state.step)
         return losses
 
-    def _note_losses(self, names: tuple[str, ...], recent: list[list[float]]) -> None:
+    def _note_losses(self, recent: list[list[float]]) -> None:
         means = [sum(column) / len(recent) for column in zip(*recent, strict=True)]
-        numbers = dict(zip(names, means, strict=True)) | {"rate": self._rate()}
+        numbers = dict(zip(LOSS_NAMES, means, strict=True)) | {"rate": self._rate()}
         self.journal.note("loss", self.state.step, time.monotonic() - self.began, numbers)
 
     def _validate(self) -> None:
