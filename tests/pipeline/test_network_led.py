@@ -153,11 +153,12 @@ def test_sure_and_wrong_weights_move_nothing_that_stands(look: Any, speed: float
     assert moved_share(perceive(street, Liar(speed)), street.on) <= 0.005
 
 
-def test_movers_are_found_beside_a_liar(busy_street: Any) -> None:
-    frames = perceive(busy_street, Liar(3.0))
-    said = np.concatenate([frame.label == MOVING for frame in frames])
-    true = np.concatenate(busy_street.on) > 0
-    assert (said & true).sum() > 0.9 * true.sum()
+@pytest.mark.parametrize("speed", [3.0, -8.0])
+def test_a_liar_takes_no_mover_away(busy_street: Any, speed: float) -> None:
+    alone = [frame.label == MOVING for frame in LabelFree().perceive(busy_street.frames)]
+    frames = perceive(busy_street, Liar(speed))
+    led = np.concatenate([frame.label == MOVING for frame in frames])
+    assert led[np.concatenate(alone)].mean() > 0.9
     assert moved_share(frames, busy_street.on) <= 0.005
 
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from lidaraccum.data.frame import Frame
+from lidaraccum.geometry import rigid
+from lidaraccum.pipeline.courses import course
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import BALANCED
-from lidaraccum.pipeline.objects import find_objects
+from lidaraccum.pipeline.search import find_objects
 from lidaraccum.pipeline.suspects import Template, make_template
 from lidaraccum.pipeline.verdict import judge, refine_velocity
 
@@ -80,3 +84,39 @@ def test_a_parked_car_that_a_mover_touches_stays(look: Any, new_mover: Any) -> N
         picked = found[0].picked[frame.index]
         on = street.on[place][frame.rows[picked]]
         assert (on == 1).mean() > 0.9
+
+
+def test_a_turning_car_is_explained_by_its_turn(frames: list[SightedFrame]) -> None:
+    """A box that turns half a radian a second beside points that do."""
+    rng = np.random.default_rng(1)
+    side = np.column_stack([rng.uniform(-2, 2, 400), np.full(400, 0.9), rng.uniform(0.3, 1.4, 400)])
+    back = np.column_stack([np.full(200, -2.0), rng.uniform(-0.9, 0.9, 200), side[:200, 2]])
+    corner = np.concatenate([side, back]) + np.array([10.0, 0.0, 0.0])
+    velocity, turn = np.array([5.0, 1.0, 0.0]), 1.2
+    centre = corner.mean(axis=0)
+    turning = [
+        SightedFrame(
+            replace(
+                one.registered,
+                world_from_sensor=np.eye(4),
+                frame=Frame(
+                    rigid.transform(course(centre, velocity, turn, one.stamp), corner).astype(
+                        np.float32
+                    ),
+                    one.stamp,
+                ),
+            ),
+            BALANCED,
+        )
+        for one in frames
+    ]
+    template = Template(corner[::8], corner[::8, 2], 0.0, centre)
+    for frame in turning:
+        frame.near_heights = frame.near_points[:, 2]
+    rivals = np.stack([np.zeros(3), velocity, velocity])
+    cost = judge(template, rivals, turning, BALANCED, np.array([0.0, 0.0, turn])).cost
+    assert cost[2] < 0.2 < cost[1] < cost[0]
+    refined = refine_velocity(
+        template, velocity + np.array([0.5, -0.4, 0.0]), turning, BALANCED, turn
+    )
+    np.testing.assert_allclose(refined, velocity, atol=0.2)

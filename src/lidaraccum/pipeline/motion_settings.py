@@ -75,14 +75,12 @@ class MotionSettings:
                 f"windows must share a frame: stride {self.stride}, window {self.window}"
             )
 
-    def trusting(self, trust: float) -> MotionSettings:
-        """What a mover must show that a proposer is so sure of, 0..1: less, but never nothing.
+    def trusting(self) -> MotionSettings:
+        """What a mover must show whose proposer is sure of it: less, but never nothing.
 
-        Below `SURE` it must show as much as any other. Above, moving must still explain the points
-        better than standing, but nobody need have seen through its place.
+        Moving must still explain the points better than standing, but nobody need have seen
+        through its place.
         """
-        if trust < SURE:
-            return self
         return replace(
             self,
             margin=TRUSTED_MARGIN * self.margin,

@@ -13,8 +13,9 @@ from lidaraccum.pipeline.association import Association
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.object_ids import ObjectIds
-from lidaraccum.pipeline.objects import WindowObject, find_objects
+from lidaraccum.pipeline.objects import WindowObject
 from lidaraccum.pipeline.painting import Canvas, paint_mover
+from lidaraccum.pipeline.search import find_objects
 
 log = logging.getLogger(__name__)
 

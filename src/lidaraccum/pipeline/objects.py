@@ -13,9 +13,8 @@ from lidaraccum.geometry import rigid
 from lidaraccum.geometry.voxel import thin
 from lidaraccum.pipeline.courses import course
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.hypotheses import propose
 from lidaraccum.pipeline.motion_settings import MotionSettings
-from lidaraccum.pipeline.suspects import Lead, Suspect, Template, find_suspects, make_template
+from lidaraccum.pipeline.suspects import Suspect, Template, make_template
 from lidaraccum.pipeline.verdict import Verdict, judge, judge_points, refine_velocity
 
 TEMPLATE_POINTS = 80
@@ -23,12 +22,6 @@ FIRST_LOOK_POINTS = 30
 REFINED_HYPOTHESES = 2
 PROBES = 5
 """So many of a longer window's frames, evenly over it, are asked for their verdict."""
-
-EXPECTED_M = 1.5
-"""A suspect this near to where a mover must be by now may be it."""
-
-CLAIMED_SHARE = 0.3
-"""A suspect with more than this share of points that are a mover's is part of it."""
 
 JOIN_M = 0.4
 WHOLE_SHARE = 0.5
@@ -44,8 +37,6 @@ standing costs it so much less than moving."""
 SAME_GAP_M = 0.8
 SAME_SPEED_MPS = 0.8
 """Two movers nearer than this and with velocities as like as this are one."""
-
-_NONE = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,95 +77,6 @@ class WindowObject:
     stamp: float
     margin: float
     turn: float = 0.0
-
-
-def find_objects(
-    frames: Sequence[SightedFrame],
-    settings: MotionSettings,
-    expected: Sequence[Expectation] = (),
-    leads: Sequence[Lead] = (),
-) -> list[WindowObject]:
-    """The movers of a window whose frames have watched one another.
-
-    Args:
-        frames: In order.
-        settings: What counts as a mover.
-        expected: Movers of earlier windows: their motions are tried first, and nothing else is
-            where they explain the points.
-        leads: Proposed movers, tried before what free space raises suspicion of.
-    """
-    claimed = _Claimed(frames)
-    for lead in leads:
-        if not claimed.has(lead.suspect):
-            stamp = frames[lead.suspect.frame].stamp
-            known = _expected_velocities(lead.suspect, stamp, expected)
-            proposals = np.concatenate([known, lead.velocities])
-            turns = np.concatenate([np.zeros(len(known)), lead.turns])
-            needed = settings.trusting(lead.trust)
-            found = explain(lead.suspect, proposals, frames, needed, turns)
-            claimed.add(_agreed(found, lead, frames) if found else None)
-    suspects = find_suspects(frames, settings)
-    for suspect in suspects:
-        if claimed.has(suspect):
-            continue
-        known = _expected_velocities(suspect, frames[suspect.frame].stamp, expected)
-        found = explain(suspect, known, frames, settings) if len(known) else None
-        if found is None:
-            proposals = propose(suspect, suspects, frames, settings)
-            found = explain(suspect, proposals, frames, settings)
-        claimed.add(found)
-    return join_parts(claimed.objects, frames)
-
-
-def _agreed(found: WindowObject, lead: Lead, frames: Sequence[SightedFrame]) -> WindowObject:
-    """The mover with those of its points that its proposer meant or that free space accuses.
-
-    Little evidence was asked of the motion, so what stands beside it must not come along.
-    """
-    picked = {}
-    for frame in frames:
-        if frame.index in found.picked:
-            own = found.picked[frame.index]
-            meant = np.isin(own, lead.picked.get(frame.index, _NONE))
-            kept = own[meant | (frame.through[own] > frame.met[own])]
-            if len(kept):
-                picked[frame.index] = kept
-    return replace(found, picked=picked)
-
-
-class _Claimed:
-    """The movers found so far and the obstacles that are theirs."""
-
-    def __init__(self, frames: Sequence[SightedFrame]) -> None:
-        self._frames = frames
-        self._taken = {frame.index: np.zeros(len(frame.rows), dtype=np.bool_) for frame in frames}
-        self.objects: list[WindowObject] = []
-
-    def has(self, suspect: Suspect) -> bool:
-        """Whether a suspect is part of a mover already."""
-        taken = self._taken[self._frames[suspect.frame].index][suspect.picked]
-        return bool(taken.mean() > CLAIMED_SHARE)
-
-    def add(self, found: WindowObject | None) -> None:
-        """A mover, where one was found."""
-        if found is None:
-            return
-        for index, picked in found.picked.items():
-            self._taken[index][picked] = True
-        self.objects.append(found)
-
-
-def _expected_velocities(
-    suspect: Suspect, stamp: float, expected: Sequence[Expectation]
-) -> NDArray[np.float64]:
-    """Velocities (H, 3) of those movers that the suspect may well be."""
-    return np.array(
-        [
-            mover.velocity
-            for mover in expected
-            if np.linalg.norm(mover.centre_at(stamp) - suspect.centre) < EXPECTED_M
-        ]
-    ).reshape(-1, 3)
 
 
 def explain(

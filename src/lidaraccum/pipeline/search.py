@@ -1,0 +1,172 @@
+"""Movers of one window: what free space accuses and what a proposer points out, each verified."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.hypotheses import propose
+from lidaraccum.pipeline.motion_settings import SURE, MotionSettings
+from lidaraccum.pipeline.objects import Expectation, WindowObject, explain, join_parts
+from lidaraccum.pipeline.suspects import Lead, Suspect, find_suspects
+
+EXPECTED_M = 1.5
+"""A suspect this near to where a mover must be by now may be it."""
+
+CLAIMED_SHARE = 0.3
+"""A suspect with more than this share of points that are a mover's is part of it."""
+
+OUTLINE_SHARE = 0.6
+"""A proposer's outline is a mover's where it holds more than this share of its points."""
+
+WHOLE_SHARE = 0.7
+"""A proposed mover stands for those found without a proposer that it overlaps if it explains at
+least this share of what they do; otherwise it is but a part of them."""
+
+_NONE = np.zeros(0, dtype=np.int64)
+
+
+def find_objects(
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+    expected: Sequence[Expectation] = (),
+    leads: Sequence[Lead] = (),
+) -> list[WindowObject]:
+    """The movers of a window whose frames have watched one another.
+
+    Args:
+        frames: In order.
+        settings: What counts as a mover.
+        expected: Movers of earlier windows: their motions are tried first, and nothing else is
+            where they explain the points.
+        leads: Proposed movers. They must show as much as any other; those whose proposer is sure
+            are asked once more, last, on less evidence, of what is nobody's yet.
+    """
+    free = _accused(frames, settings, expected)
+    proposed = _Claimed(frames)
+    for lead in leads:
+        if not proposed.has(lead.suspect):
+            found = _explain_lead(lead, frames, settings, expected)
+            proposed.add(_outlined(found, lead, frames) if found else None)
+    claimed = _Claimed(frames)
+    for one in _settle(proposed.objects, free):
+        claimed.add(one)
+    for lead in leads:
+        if lead.trust >= SURE and not claimed.has(lead.suspect):
+            found = _explain_lead(lead, frames, settings.trusting(), expected)
+            claimed.add(_meant(found, lead, frames) if found else None)
+    return join_parts(claimed.objects, frames)
+
+
+def _accused(
+    frames: Sequence[SightedFrame], settings: MotionSettings, expected: Sequence[Expectation]
+) -> list[WindowObject]:
+    """The movers that free space raises suspicion of."""
+    claimed = _Claimed(frames)
+    suspects = find_suspects(frames, settings)
+    for suspect in suspects:
+        if claimed.has(suspect):
+            continue
+        known = _expected_velocities(suspect, frames[suspect.frame].stamp, expected)
+        found = explain(suspect, known, frames, settings) if len(known) else None
+        if found is None:
+            proposals = propose(suspect, suspects, frames, settings)
+            found = explain(suspect, proposals, frames, settings)
+        claimed.add(found)
+    return claimed.objects
+
+
+def _settle(proposed: Sequence[WindowObject], free: Sequence[WindowObject]) -> list[WindowObject]:
+    """Of movers found both ways, those that explain more; a proposer's outline where as good."""
+    kept, left = [], list(free)
+    for one in proposed:
+        rivals = [other for other in left if _overlap(one, other)]
+        if _saved(one) >= WHOLE_SHARE * sum(map(_saved, rivals)):
+            kept.append(one)
+            left = [other for other in left if not any(other is rival for rival in rivals)]
+    return sorted(kept + left, key=lambda one: -max(map(len, one.picked.values()), default=0))
+
+
+def _saved(one: WindowObject) -> float:
+    """How much cheaper the motion makes all its points than standing still."""
+    return one.margin * sum(map(len, one.picked.values()))
+
+
+def _overlap(one: WindowObject, other: WindowObject) -> bool:
+    return any(
+        len(np.intersect1d(picked, other.picked[index]))
+        > CLAIMED_SHARE * min(len(picked), len(other.picked[index]))
+        for index, picked in one.picked.items()
+        if index in other.picked
+    )
+
+
+def _explain_lead(
+    lead: Lead,
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+    expected: Sequence[Expectation],
+) -> WindowObject | None:
+    known = _expected_velocities(lead.suspect, frames[lead.suspect.frame].stamp, expected)
+    proposals = np.concatenate([known, lead.velocities])
+    turns = np.concatenate([np.zeros(len(known)), lead.turns])
+    return explain(lead.suspect, proposals, frames, settings, turns)
+
+
+def _outlined(found: WindowObject, lead: Lead, frames: Sequence[SightedFrame]) -> WindowObject:
+    """The mover within its proposer's outline, where that holds most of what moves with it."""
+    meant = _meant(found, lead, frames)
+    counts = [sum(map(len, one.picked.values())) for one in (meant, found)]
+    return meant if counts[0] > OUTLINE_SHARE * counts[1] else found
+
+
+def _meant(found: WindowObject, lead: Lead, frames: Sequence[SightedFrame]) -> WindowObject:
+    """The mover with those of its points that its proposer meant or that free space accuses."""
+    picked = {}
+    for frame in frames:
+        if frame.index in found.picked:
+            own = found.picked[frame.index]
+            meant = np.isin(own, lead.picked.get(frame.index, _NONE))
+            kept = own[meant | (frame.through[own] > frame.met[own])]
+            if len(kept):
+                picked[frame.index] = kept
+    return replace(found, picked=picked)
+
+
+class _Claimed:
+    """The movers found so far and the obstacles that are theirs."""
+
+    def __init__(self, frames: Sequence[SightedFrame]) -> None:
+        self._frames = frames
+        self._taken = {frame.index: np.zeros(len(frame.rows), dtype=np.bool_) for frame in frames}
+        self.objects: list[WindowObject] = []
+
+    def has(self, suspect: Suspect) -> bool:
+        """Whether a suspect is part of a mover already."""
+        taken = self._taken[self._frames[suspect.frame].index][suspect.picked]
+        return bool(taken.mean() > CLAIMED_SHARE)
+
+    def add(self, found: WindowObject | None) -> None:
+        """A mover, where one was found."""
+        if found is None:
+            return
+        for index, picked in found.picked.items():
+            self._taken[index][picked] = True
+        self.objects.append(found)
+
+
+def _expected_velocities(
+    suspect: Suspect, stamp: float, expected: Sequence[Expectation]
+) -> NDArray[np.float64]:
+    """Velocities (H, 3) of those movers that the suspect may well be."""
+    return np.array(
+        [
+            mover.velocity
+            for mover in expected
+            if np.linalg.norm(mover.centre_at(stamp) - suspect.centre) < EXPECTED_M
+        ]
+    ).reshape(-1, 3)
