@@ -36,6 +36,7 @@ HOMES_OF = {
         "pipeline/meshing",
         "evaluation/rivals",
     },
+    "embreex": {"simulation/raycast"},
     "kiss_icp": {"evaluation/rivals"},
     "laspy": {"io"},
     "matplotlib": {"training/curves"},

@@ -15,7 +15,7 @@ from lidaraccum.simulation.ego import Ego, draw_body, draw_mount, drive_ego
 from lidaraccum.simulation.labelling import Movables, Seen, label
 from lidaraccum.simulation.motion import sample_times, speed_profile
 from lidaraccum.simulation.networks import lay_network
-from lidaraccum.simulation.raycast import Open3DRayCaster, RayCaster
+from lidaraccum.simulation.raycast import RayCaster, usual_caster
 from lidaraccum.simulation.returns import Echoes, draw_bias, measure
 from lidaraccum.simulation.scan import Encounter, Rays, Solid, Stage, aim
 from lidaraccum.simulation.settings import DriveSettings, child, draw_drive
@@ -228,9 +228,9 @@ def simulate(settings: DriveSettings, caster: RayCaster | None = None) -> Simula
 
     Args:
         settings: What to simulate.
-        caster: Casts the rays; Open3D on one thread unless told.
+        caster: Casts the rays; open3d or embreex, whichever there is, on one thread unless told.
 
     Raises:
-        MissingDependencyError: When no caster is given and open3d is not installed.
+        MissingDependencyError: When no caster is given and neither of them is installed.
     """
-    return SimulatedSequence(settings, caster or Open3DRayCaster())
+    return SimulatedSequence(settings, caster or usual_caster())
