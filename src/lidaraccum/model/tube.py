@@ -105,7 +105,7 @@ class TubeMotions:
 class TubeNet(nn.Module):
     """Regresses, for each object and time, the rigid motion to the object's anchor frame.
 
-    Source: the paper, section 3.5 and supplement.
+    Source: the paper, section 3.5 and supplement; that the gap between centroids is told is ours.
     """
 
     def __init__(self, settings: NetworkSettings) -> None:
@@ -117,7 +117,7 @@ class TubeNet(nn.Module):
             linear(4, 64), nn.ReLU(), linear(64, wide), nn.ReLU(), linear(wide, wide)
         )
         self.regress = nn.Sequential(
-            linear(128 + 2 * wide + 1, 256), nn.ReLU(), linear(256, 128), nn.ReLU()
+            linear(128 + 2 * wide + 4, 256), nn.ReLU(), linear(256, 128), nn.ReLU()
         )
         self.last = nn.Linear(128, 7)
         nn.init.normal_(self.last.weight, std=1e-5)
@@ -159,6 +159,7 @@ class TubeNet(nn.Module):
         ).view(count, span, -1)
         rows = torch.arange(count, device=moved.device)
         at_anchor = summary[rows, tubes.anchor_time][:, None].expand(-1, span, -1)
+        gap = _centroid_gap(moved, tubes)
         ahead = torch.arange(span, device=moved.device)[None] - tubes.anchor_time[:, None]
         said = torch.cat(
             [
@@ -166,6 +167,7 @@ class TubeNet(nn.Module):
                 summary,
                 at_anchor,
                 ahead[..., None].float() / span,
+                gap,
             ],
             dim=2,
         )
@@ -176,6 +178,20 @@ def _identity(numbers: torch.Tensor) -> torch.Tensor:
     one = torch.zeros_like(numbers[..., :4])
     one[..., 0] = 1.0
     return one
+
+
+def _centroid_gap(moved: torch.Tensor, tubes: Tubes) -> torch.Tensor:
+    """(K, T, 3) metres from the mean of an object's moved points (Q, 3) to that at its anchor.
+
+    Most of a shift, had for nothing; how much of it is motion, and how much another view of the
+    same sides, is for the net to say.
+    """
+    count, span = tubes.counts.shape
+    slot = tubes.instance * span + tubes.time
+    sums = moved.new_zeros(count * span, 3).index_add(0, slot, moved)
+    mean = sums.view(count, span, 3) / tubes.counts.clamp_min(1)[..., None]
+    anchor = mean[torch.arange(count, device=mean.device), tubes.anchor_time]
+    return torch.where(tubes.counts[..., None] > 0, anchor[:, None] - mean, 0.0)
 
 
 def _move_points(total: torch.Tensor, tubes: Tubes) -> torch.Tensor:
