@@ -20,12 +20,21 @@ EXPECTED_M = 1.5
 CLAIMED_SHARE = 0.3
 """A suspect with more than this share of points that are a mover's is part of it."""
 
+KNOWN_SHARE = 0.8
+"""A proposed mover with more than this share of points that are a mover's is known."""
+
 OUTLINE_SHARE = 0.6
 """A proposer's outline is a mover's where it holds more than this share of its points."""
 
-WHOLE_SHARE = 0.7
-"""A proposed mover stands for those found without a proposer that it overlaps if it explains at
-least this share of what they do; otherwise it is but a part of them."""
+WHOLE_SHARE = 0.85
+BETTER_SHARE = 0.7
+"""A proposed mover stands for others that it overlaps and that move like it if it has at least the
+first share of their points, for others that move otherwise if it explains the second share of what
+they do; else it is but a part of them, or wrong."""
+
+ALIKE_MPS = 0.8
+ALIKE_SHARE = 0.1
+"""Velocities nearer than this, and this share of the speed, are alike."""
 
 _NONE = np.zeros(0, dtype=np.int64)
 
@@ -44,22 +53,22 @@ def find_objects(
         expected: Movers of earlier windows: their motions are tried first, and nothing else is
             where they explain the points.
         leads: Proposed movers. They must show as much as any other; those whose proposer is sure
-            are asked once more, last, on less evidence, of what is nobody's yet.
+            are asked once more, last, on less evidence.
     """
     free = _accused(frames, settings, expected)
     proposed = _Claimed(frames)
     for lead in leads:
-        if not proposed.has(lead.suspect):
+        if proposed.share(lead.suspect) <= CLAIMED_SHARE:
             found = _explain_lead(lead, frames, settings, expected)
             proposed.add(_outlined(found, lead, frames) if found else None)
-    claimed = _Claimed(frames)
-    for one in _settle(proposed.objects, free):
-        claimed.add(one)
+    movers = _settle(proposed.objects, free, frames, BETTER_SHARE)
     for lead in leads:
-        if lead.trust >= SURE and not claimed.has(lead.suspect):
+        if lead.trust >= SURE and _Claimed(frames, movers).share(lead.suspect) <= KNOWN_SHARE:
             found = _explain_lead(lead, frames, settings.trusting(), expected)
-            claimed.add(_meant(found, lead, frames) if found else None)
-    return join_parts(claimed.objects, frames)
+            movers = (
+                _settle([_meant(found, lead, frames)], movers, frames, 1.0) if found else movers
+            )
+    return join_parts(movers, frames)
 
 
 def _accused(
@@ -69,7 +78,7 @@ def _accused(
     claimed = _Claimed(frames)
     suspects = find_suspects(frames, settings)
     for suspect in suspects:
-        if claimed.has(suspect):
+        if claimed.share(suspect) > CLAIMED_SHARE:
             continue
         known = _expected_velocities(suspect, frames[suspect.frame].stamp, expected)
         found = explain(suspect, known, frames, settings) if len(known) else None
@@ -80,20 +89,62 @@ def _accused(
     return claimed.objects
 
 
-def _settle(proposed: Sequence[WindowObject], free: Sequence[WindowObject]) -> list[WindowObject]:
-    """Of movers found both ways, those that explain more; a proposer's outline where as good."""
-    kept, left = [], list(free)
+def _settle(
+    proposed: Sequence[WindowObject],
+    others: Sequence[WindowObject],
+    frames: Sequence[SightedFrame],
+    share: float,
+) -> list[WindowObject]:
+    """Movers without those that overlap: a proposed one, or those it overlaps.
+
+    Args:
+        proposed: Movers by a proposer's word.
+        others: Movers known already.
+        frames: The window.
+        share: Of what others explain by another motion, a proposed one explains so much.
+    """
+    kept, left = [], list(others)
     for one in proposed:
         rivals = [other for other in left if _overlap(one, other)]
-        if _saved(one) >= WHOLE_SHARE * sum(map(_saved, rivals)):
-            kept.append(one)
+        if _stands_for(one, rivals, share):
+            kept.append(_with_accused(one, rivals, frames))
             left = [other for other in left if not any(other is rival for rival in rivals)]
     return sorted(kept + left, key=lambda one: -max(map(len, one.picked.values()), default=0))
 
 
+def _stands_for(one: WindowObject, rivals: Sequence[WindowObject], share: float) -> bool:
+    """Whether a proposed mover is better than those it overlaps: its parts, or something else."""
+    if all(_moves_alike(one, rival) for rival in rivals):
+        return _size(one) >= WHOLE_SHARE * sum(map(_size, rivals))
+    return _saved(one) >= share * sum(map(_saved, rivals))
+
+
+def _with_accused(
+    one: WindowObject, rivals: Sequence[WindowObject], frames: Sequence[SightedFrame]
+) -> WindowObject:
+    """A proposed mover and what is seen through of those that it stands for."""
+    picked = dict(one.picked)
+    for frame in frames:
+        for rival in rivals:
+            theirs = rival.picked.get(frame.index, _NONE)
+            accused = theirs[frame.through[theirs] > frame.met[theirs]]
+            if len(accused):
+                picked[frame.index] = np.union1d(picked.get(frame.index, _NONE), accused)
+    return replace(one, picked=picked)
+
+
+def _moves_alike(one: WindowObject, other: WindowObject) -> bool:
+    allowed = ALIKE_MPS + ALIKE_SHARE * float(np.linalg.norm(one.velocity))
+    return bool(np.linalg.norm(one.velocity - other.velocity) < allowed)
+
+
+def _size(one: WindowObject) -> int:
+    return sum(map(len, one.picked.values()))
+
+
 def _saved(one: WindowObject) -> float:
     """How much cheaper the motion makes all its points than standing still."""
-    return one.margin * sum(map(len, one.picked.values()))
+    return one.margin * _size(one)
 
 
 def _overlap(one: WindowObject, other: WindowObject) -> bool:
@@ -140,15 +191,19 @@ def _meant(found: WindowObject, lead: Lead, frames: Sequence[SightedFrame]) -> W
 class _Claimed:
     """The movers found so far and the obstacles that are theirs."""
 
-    def __init__(self, frames: Sequence[SightedFrame]) -> None:
+    def __init__(
+        self, frames: Sequence[SightedFrame], objects: Sequence[WindowObject] = ()
+    ) -> None:
         self._frames = frames
         self._taken = {frame.index: np.zeros(len(frame.rows), dtype=np.bool_) for frame in frames}
         self.objects: list[WindowObject] = []
+        for one in objects:
+            self.add(one)
 
-    def has(self, suspect: Suspect) -> bool:
-        """Whether a suspect is part of a mover already."""
+    def share(self, suspect: Suspect) -> float:
+        """How much of a suspect is a mover's already."""
         taken = self._taken[self._frames[suspect.frame].index][suspect.picked]
-        return bool(taken.mean() > CLAIMED_SHARE)
+        return float(taken.mean())
 
     def add(self, found: WindowObject | None) -> None:
         """A mover, where one was found."""
