@@ -12,6 +12,9 @@ from lidaraccum.model.pooling import tallest
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.model.unet import linear
 
+_LENGTH_M = 4.0
+"""About that of a car: positions are told in it."""
+
 ITERATIONS = 2
 """As in the paper's supplement; gradients do not flow from one into the other."""
 
@@ -105,7 +108,9 @@ class TubeMotions:
 class TubeNet(nn.Module):
     """Regresses, for each object and time, the rigid motion to the object's anchor frame.
 
-    Source: the paper, section 3.5 and supplement; that the gap between centroids is told is ours.
+    Ours: the shift is a share of the gap between the object's centroids plus a correction.
+
+    Source: the paper, section 3.5 and supplement.
     """
 
     def __init__(self, settings: NetworkSettings) -> None:
@@ -116,10 +121,16 @@ class TubeNet(nn.Module):
         self.place = nn.Sequential(
             linear(4, 64), nn.ReLU(), linear(64, wide), nn.ReLU(), linear(wide, wide)
         )
+        # Normalised, for what comes in is metres: unbounded signals had killed every unit.
         self.regress = nn.Sequential(
-            linear(128 + 2 * wide + 4, 256), nn.ReLU(), linear(256, 128), nn.ReLU()
+            linear(128 + 2 * wide + 4, 256),
+            nn.LayerNorm(256),
+            nn.ReLU(),
+            linear(256, 128),
+            nn.LayerNorm(128),
+            nn.ReLU(),
         )
-        self.last = nn.Linear(128, 7)
+        self.last = nn.Linear(128, 8)
         nn.init.normal_(self.last.weight, std=1e-5)
         nn.init.zeros_(self.last.bias)  # the identity: see `_identity`
 
@@ -153,7 +164,7 @@ class TubeNet(nn.Module):
     def _step(self, tubes: Tubes, general: torch.Tensor, moved: torch.Tensor) -> torch.Tensor:
         """(K, T, 7) quaternion less the identity, and shift, of this iteration."""
         count, span = tubes.counts.shape
-        place = self.place(torch.cat([moved, tubes.seconds[:, None]], dim=1))
+        place = self.place(torch.cat([moved / _LENGTH_M, tubes.seconds[:, None]], dim=1))
         summary = tallest(
             torch.relu(place).float(), tubes.instance * span + tubes.time, count * span
         ).view(count, span, -1)
@@ -167,11 +178,12 @@ class TubeNet(nn.Module):
                 summary,
                 at_anchor,
                 ahead[..., None].float() / span,
-                gap,
+                gap / _LENGTH_M,
             ],
             dim=2,
         )
-        return self.last(self.regress(said))
+        numbers = self.last(self.regress(said)).float()
+        return torch.cat([numbers[..., :4], numbers[..., 4:7] + numbers[..., 7:] * gap], dim=2)
 
 
 def _identity(numbers: torch.Tensor) -> torch.Tensor:
@@ -183,8 +195,8 @@ def _identity(numbers: torch.Tensor) -> torch.Tensor:
 def _centroid_gap(moved: torch.Tensor, tubes: Tubes) -> torch.Tensor:
     """(K, T, 3) metres from the mean of an object's moved points (Q, 3) to that at its anchor.
 
-    Most of a shift, had for nothing; how much of it is motion, and how much another view of the
-    same sides, is for the net to say.
+    Most of a shift, had for nothing; what share of it is motion, and what share another view of
+    the same sides, is for the net to say.
     """
     count, span = tubes.counts.shape
     slot = tubes.instance * span + tubes.time

@@ -8,7 +8,6 @@ from typing import cast
 import torch
 from torch import nn
 
-
 FAINT = 0.01
 """Variance below which a cell is empty rather than faint, and is not blown up."""
 
