@@ -56,6 +56,10 @@ def test_a_rolling_sweep_comes_out_straight(world: Any, rolling: Any, times: boo
         truth = straight_points(raw, world.interval_s)
         off = np.linalg.norm(one.frame.points - truth, axis=1)
         assert np.median(off) < 0.02
+        assert one.seconds_from_stamp is not None
+        np.testing.assert_allclose(
+            np.median(one.seconds_from_stamp - raw.time_offset), 0, atol=1e-3
+        )
 
 
 @pytest.mark.parametrize("times", [True, False], ids=["times", "no times"])
@@ -64,6 +68,10 @@ def test_a_compensated_sweep_is_not_bent(world: Any, rolling: Any, times: bool) 
     registered = list(register(frames))
     assert not any(frame.deskewed for frame in registered)
     np.testing.assert_array_equal(registered[2].frame.points, frames[2].points)
+    seconds = registered[2].seconds_from_stamp
+    assert (seconds is not None) == times
+    if seconds is not None:
+        np.testing.assert_array_equal(seconds, frames[2].time_offset)
 
 
 def test_a_sweep_at_one_time_is_not_bent(straight: Any) -> None:
@@ -74,6 +82,7 @@ def test_deskew_off_leaves_points_alone(rolling: Any) -> None:
     registered = list(register(rolling.frames, RegistrationSettings(deskew="off")))
     for one, raw in zip(registered, rolling.frames, strict=True):
         np.testing.assert_array_equal(one.frame.points, raw.points)
+        assert one.seconds_from_stamp is None
 
 
 def test_spacing_tells_measured_from_compensated(world: Any, rolling: Any) -> None:

@@ -24,6 +24,8 @@ class PerceivedFrame:
         confidence: (N,) float32, 0..1, of the label; 0 where nobody looked.
         world_from_object: Pose (4, 4) in this frame of each instance that moves, in any
             coordinates fixed to the object; instances not named here stand still.
+        poses_at_stamp: Whether these poses are those at the frame's stamp. Otherwise they belong
+            to the points as they lie, which a sweep passed some time before or after it.
     """
 
     registered: RegisteredFrame
@@ -31,6 +33,7 @@ class PerceivedFrame:
     instance: NDArray[np.int32]
     confidence: NDArray[np.float32]
     world_from_object: Mapping[int, rigid.Pose] = field(default_factory=dict)
+    poses_at_stamp: bool = False
 
     def __post_init__(self) -> None:
         count = len(self.registered.frame)

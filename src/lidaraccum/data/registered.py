@@ -39,6 +39,8 @@ class RegisteredFrame:
             sensor coordinates unless poses were given.
         quality: How far the pose can be trusted.
         deskewed: Whether the points were moved to the stamp.
+        seconds_from_stamp: (N,) float32: when each point was measured, by the clock that
+            registration went by; None where nothing tells or nobody is to look.
     """
 
     index: int
@@ -46,3 +48,4 @@ class RegisteredFrame:
     world_from_sensor: NDArray[np.float64]
     quality: RegistrationQuality
     deskewed: bool = False
+    seconds_from_stamp: NDArray[np.float32] | None = None

@@ -20,6 +20,7 @@ from lidaraccum.model.weights import chosen_weights, shipped_weights
 from lidaraccum.pipeline.clock import StageClock
 from lidaraccum.pipeline.label_free import LabelFree
 from lidaraccum.pipeline.motion_settings import PRESETS
+from lidaraccum.pipeline.mover_deskew import undo_own_motion
 from lidaraccum.pipeline.network_led import NetworkLed
 from lidaraccum.pipeline.perception import AllStatic, GivenLabels, Perceiver
 from lidaraccum.pipeline.placing import Reference
@@ -138,7 +139,7 @@ class Accumulator:
         if registered is None:
             registered = self.clock.timed("register", self._register(frames))
         perceived = self.clock.timed("perceive", self._perceiver.perceive(registered))
-        noted = self._note(perceived)
+        noted = self._note(self.clock.timed("undo own motion", self._undo(perceived)))
         if self._reference_index > 0:
             noted = self.clock.timed("wait for the reference", after_the_last(noted))
         yield from self.clock.timed("place", self._place(noted))
@@ -161,6 +162,9 @@ class Accumulator:
 
     def _register(self, frames: Iterable[Frame]) -> Iterator[RegisteredFrame]:
         return register(frames, self._settings.registration, self._sequence.poses)
+
+    def _undo(self, frames: Iterable[PerceivedFrame]) -> Iterator[PerceivedFrame]:
+        return undo_own_motion(frames, PRESETS[self._settings.preset].max_speed_mps)
 
     def _note(self, frames: Iterable[PerceivedFrame]) -> Iterator[PerceivedFrame]:
         for perceived in frames:

@@ -82,4 +82,6 @@ class GivenLabels:
                 for box in labels.boxes
                 if box.id in moving
             },
+            # Boxes beside points as recorded were drawn around them.
+            poses_at_stamp=labels.points_at_stamp is not None,
         )

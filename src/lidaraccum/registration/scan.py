@@ -31,6 +31,7 @@ class Scan:
         rows: (M,) int64: the thin choice of them that is aligned.
         fractions: (N,) time of each point from the stamp in frame intervals; None: no motion
             inside the sweep.
+        interval_s: Seconds of a frame interval.
     """
 
     index: int
@@ -38,6 +39,7 @@ class Scan:
     usable: BoolArray
     rows: NDArray[np.int64]
     fractions: NDArray[np.float64] | None
+    interval_s: float
 
     def source(self, twist: NDArray[np.float64]) -> NDArray[np.float64]:
         """The chosen points (M, 3) at the stamp, had the sensor moved by ``twist`` (6,)."""
@@ -56,6 +58,18 @@ class Scan:
     def bends(self) -> bool:
         """Whether there is motion inside the sweep to be undone."""
         return self.fractions is not None
+
+    @property
+    def seconds_from_stamp(self) -> NDArray[np.float32] | None:
+        """When each point (N,) was measured; None where nothing tells.
+
+        Times in the file hold also where the sensor's motion was undone before.
+        """
+        if self.fractions is not None:
+            return (self.fractions * self.interval_s).astype(np.float32)
+        if self.raw.time_offset is not None:
+            return self.raw.time_offset.astype(np.float32)
+        return None
 
 
 def usable_points(
@@ -89,4 +103,4 @@ def prepare(
     interval_s, source_voxel_m = sizes
     candidates = np.flatnonzero(usable)
     rows = candidates[voxel.thin(raw.points[candidates], source_voxel_m)]
-    return Scan(index, raw, usable, rows, clock.fractions(raw, interval_s))
+    return Scan(index, raw, usable, rows, clock.fractions(raw, interval_s), interval_s)

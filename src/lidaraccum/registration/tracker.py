@@ -191,7 +191,7 @@ class Tracker:
         if not lost:
             self.twist = twist
         elif self._lost <= PATIENCE:
-            return _registered(scan, scan.straightened(twist), pose, quality)
+            return self._registered(scan, scan.straightened(twist), pose, quality)
         else:
             self._judge.forget()
         return self._remember(scan, twist, pose, quality)
@@ -207,7 +207,20 @@ class Tracker:
         self._surface.insert(rigid.transform(pose, frame.points[scan.usable]), scan.index)
         self._surface.forget_far(pose[:3, 3], scan.index)
         self._last = Fix(scan.index, frame.stamp, pose)
-        return _registered(scan, frame, pose, quality)
+        return self._registered(scan, frame, pose, quality)
+
+    def _registered(
+        self, scan: Scan, frame: Frame, pose: rigid.Pose, quality: RegistrationQuality
+    ) -> RegisteredFrame:
+        seconds = None if self._settings.deskew == "off" else scan.seconds_from_stamp
+        return RegisteredFrame(
+            scan.index,
+            frame,
+            pose,
+            quality,
+            deskewed=scan.bends,
+            seconds_from_stamp=seconds,
+        )
 
     def _prepare(self, index: int, raw: Frame, usable: BoolArray) -> Scan:
         sizes = (self._pace.interval_s, self._settings.source_voxel_m)
@@ -225,12 +238,6 @@ class Tracker:
     def _speed(self, pose: rigid.Pose, steps: float) -> float:
         twist = self._twist_to(pose, steps)
         return float(np.linalg.norm(twist[3:])) / self._pace.interval_s
-
-
-def _registered(
-    scan: Scan, frame: Frame, pose: rigid.Pose, quality: RegistrationQuality
-) -> RegisteredFrame:
-    return RegisteredFrame(scan.index, frame, pose, quality, deskewed=scan.bends)
 
 
 def _are_same(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
