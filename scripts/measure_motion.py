@@ -1,7 +1,7 @@
-"""How well movers are found from geometry alone, on a folder of frames, labelled or not.
+"""How well movers are found, by geometry alone or led by the network, on a folder of frames.
 
 Usage: python scripts/measure_motion.py DIR [--poses found|given] [--preset balanced]
-           [--window T] [--apart] [--frames N]
+           [--window T] [--apart] [--frames N] [--weights FILE]
 
 Scores only ``annotated`` points where the labels say which. ``--apart`` cuts the sequence into
 windows that share no frame and sees each alone. Sharpness is that of each true mover's accumulated
@@ -16,6 +16,7 @@ import sys
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +29,11 @@ from lidaraccum.data.registered import RegisteredFrame, RegistrationQuality
 from lidaraccum.geometry import rigid
 from lidaraccum.io.sequences import FileSequence, InputSettings, open_sequence
 from lidaraccum.metrics.segmentation import SegmentationCounts, compare
+from lidaraccum.model.reader import NetworkReader
 from lidaraccum.pipeline.label_free import LabelFree
-from lidaraccum.pipeline.motion_settings import AGGRESSIVE, BALANCED, CONSERVATIVE
+from lidaraccum.pipeline.motion_settings import AGGRESSIVE, BALANCED, CONSERVATIVE, MotionSettings
+from lidaraccum.pipeline.network_led import NetworkLed
+from lidaraccum.pipeline.perception import Perceiver
 from lidaraccum.registration.odometry import RegistrationSettings, register
 
 PRESETS = {"conservative": CONSERVATIVE, "balanced": BALANCED, "aggressive": AGGRESSIVE}
@@ -171,6 +175,10 @@ class Report:
             say(line)
 
 
+def _perceiver(settings: MotionSettings, reader: NetworkReader | None) -> Perceiver:
+    return NetworkLed(reader, settings) if reader else LabelFree(settings)
+
+
 def main() -> None:
     """Parse, run, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -180,6 +188,7 @@ def main() -> None:
     parser.add_argument("--window", type=int, default=0)
     parser.add_argument("--apart", action="store_true")
     parser.add_argument("--frames", type=int, default=0)
+    parser.add_argument("--weights", type=Path)
     options = parser.parse_args()
     sequence = open_sequence(
         options.directory, InputSettings(poses="auto" if options.poses == "given" else "")
@@ -189,16 +198,17 @@ def main() -> None:
     window = min(options.window or preset.window, count)
     settings = replace(preset, window=window, stride=min(preset.stride, (window - 1) // 2 or 1))
     frames = registered_frames(sequence, options.poses, count)
+    reader = NetworkReader.open(options.weights) if options.weights else None
     report, watch = Report(sequence), Stopwatch()
     start = time.process_time()
     if options.apart:
         batch = list(frames)
         watch.outside += time.process_time() - start
         for first in range(0, count, window):
-            for perceived in LabelFree(settings).perceive(batch[first : first + window]):
+            for perceived in _perceiver(settings, reader).perceive(batch[first : first + window]):
                 report.add(perceived)
     else:
-        perceived_frames = LabelFree(settings).perceive(watch.around(frames))
+        perceived_frames = _perceiver(settings, reader).perceive(watch.around(frames))
         for perceived in perceived_frames:
             pause = time.process_time()
             report.add(perceived)

@@ -1,6 +1,6 @@
-"""Scores weights on the simulator's test set, the network doing all of it itself.
+"""Scores weights on the simulator's test set or a labelled drive, the network doing it all itself.
 
-Usage: score_weights.py WEIGHTS [--windows 40] [--extent 64] [--threads 2]
+Usage: score_weights.py WEIGHTS [--windows 40] [--extent 64] [--threads 2] [--drive DIR]
 
 Prints two Markdown tables: the whole network beside the paper's figures (its own poses, masks,
 objects and motions; five frames, the first the target, ground included, sweeps compensated), and
@@ -15,12 +15,14 @@ from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
 
+import numpy as np
 import torch
 from tqdm import tqdm
 
 from lidaraccum.evaluation import paper
 from lidaraccum.evaluation.scores import Scores as EvaluationScores
 from lidaraccum.evaluation.table import Row, row_of
+from lidaraccum.io.sequences import open_sequence
 from lidaraccum.metrics.segmentation import SegmentationCounts
 from lidaraccum.model.checkpoint import load_network
 from lidaraccum.model.settings import NetworkSettings
@@ -32,9 +34,11 @@ from lidaraccum.training.stages import StageScores, score_stages
 from lidaraccum.training.truth import make_window
 from lidaraccum.training.window import Batch, make_batch
 
+WINDOW = 5
 STAGES = (
-    "foreground_iou", "motion_iou", "ego_epe_m", "ego_epe_median_m", "offset_m", "object_epe_m",
-    "object_still_m",
+    "foreground_iou", "foreground_precision", "foreground_recall", "motion_iou",
+    "motion_precision", "motion_recall", "ego_epe_m", "ego_epe_median_m", "offset_m",
+    "object_epe_m", "object_still_m",
 )  # fmt: skip
 
 
@@ -44,6 +48,18 @@ def test_windows(count: int, extent_m: float, settings: NetworkSettings) -> Iter
         drawn = replace(held_out_settings(number * TEST_WINDOWS // count), compensated=True)
         drive = simulate(drawn)
         frames = [(drive[index], drive.labels(index)) for index in range(len(drive))]
+        yield make_batch([make_window(frames, 0, settings, extent_m)])
+
+
+def drive_windows(
+    folder: Path, count: int, extent_m: float, settings: NetworkSettings
+) -> Iterator[Batch]:
+    """Windows of five frames spread evenly over a labelled drive, as its files are."""
+    drive = open_sequence(folder)
+    starts = np.unique(np.linspace(0, len(drive) - WINDOW, count).astype(int)).tolist()
+    for start in starts:
+        places = range(start, start + WINDOW)
+        frames = [(drive[index], drive.labels(index)) for index in places]
         yield make_batch([make_window(frames, 0, settings, extent_m)])
 
 
@@ -74,16 +90,16 @@ def main() -> None:
     parser.add_argument("--windows", type=int, default=40)
     parser.add_argument("--extent", type=float, default=64.0)
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--drive", type=Path)
     options = parser.parse_args()
     torch.set_num_threads(options.threads)
     network = load_network(options.weights)
-    batches = test_windows(options.windows, options.extent, network.settings)
+    what = (options.windows, options.extent, network.settings)
+    batches = drive_windows(options.drive, *what) if options.drive else test_windows(*what)
     began = time.monotonic()
     with torch.no_grad():
         parts = [score_stages(network, batch) for batch in tqdm(batches, total=options.windows)]
-    print(
-        f"{len(parts)} test windows, {options.extent:g} m grid, {time.monotonic() - began:.0f} s\n"
-    )
+    print(f"{len(parts)} windows, {options.extent:g} m grid, {time.monotonic() - began:.0f} s\n")
     tell(Row.titles(), [whole_row("network alone", parts).cells(), paper.WAYMO.cells()])
     stages = asdict(scores_of(parts))
     print("\nEach stage given the truth of those before it:\n")
