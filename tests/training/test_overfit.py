@@ -12,9 +12,10 @@ from lidaraccum.model.network import build_network
 from lidaraccum.training.clusters import TRUE_CLUSTERS
 from lidaraccum.training.objective import ObjectiveSettings, objective
 from lidaraccum.training.scores import score_network
+from lidaraccum.training.trainer import clip_gradients
 from lidaraccum.training.window import make_batch
 
-STEPS = 250
+STEPS = 150
 
 
 @pytest.mark.slow
@@ -32,11 +33,11 @@ def test_two_windows_are_learned_by_heart(toy: ModuleType) -> None:
         losses = objective(network, batch, settings, generator)
         optimiser.zero_grad()
         losses.total.backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        clip_gradients(network, 5.0)
         optimiser.step()
     after = score_network(network, batches)
     assert after.foreground_iou > 0.8
     assert after.motion_iou > 0.7
     # Points are drawn anew in every frame, so pillars only match roughly.
-    assert after.ego_epe_m < 0.7 * before.ego_epe_m
-    assert after.object_epe_m < 0.7 * after.object_still_m
+    assert after.ego_epe_m < 0.55 * before.ego_epe_m
+    assert after.object_epe_m < 0.3 * after.object_still_m
