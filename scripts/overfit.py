@@ -15,6 +15,7 @@ import numpy as np
 import torch
 
 from lidaraccum.model.network import build_network
+from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.simulation.drive import simulate
 from lidaraccum.simulation.windows import training_settings
 from lidaraccum.training.augment import NO_AUGMENTATION, augment
@@ -36,7 +37,7 @@ def window(seed: int) -> TrainingWindow:
     frames = [(drive[index], drive.labels(index)) for index in range(5)]
     thin = replace(NO_AUGMENTATION, most_points=40_000)
     frames = augment(frames, thin, np.random.default_rng(seed))
-    return make_window(frames, 0, build_network().settings, 32.0)
+    return make_window(frames, 0, NetworkSettings(), 32.0)
 
 
 def main() -> None:

@@ -31,7 +31,7 @@ from lidaraccum.simulation.windows import TEST_WINDOWS, held_out_settings
 from lidaraccum.training.end_to_end import EndToEnd
 from lidaraccum.training.scores import scores_of
 from lidaraccum.training.stages import StageScores, score_stages
-from lidaraccum.training.truth import make_window
+from lidaraccum.training.truth import window_of
 from lidaraccum.training.window import Batch, make_batch
 
 WINDOW = 5
@@ -47,8 +47,7 @@ def test_windows(count: int, extent_m: float, settings: NetworkSettings) -> Iter
     for number in range(count):
         drawn = replace(held_out_settings(number * TEST_WINDOWS // count), compensated=True)
         drive = simulate(drawn)
-        frames = [(drive[index], drive.labels(index)) for index in range(len(drive))]
-        yield make_batch([make_window(frames, 0, settings, extent_m)])
+        yield make_batch([window_of(drive, range(len(drive)), settings, extent_m)])
 
 
 def drive_windows(
@@ -59,8 +58,7 @@ def drive_windows(
     starts = np.unique(np.linspace(0, len(drive) - WINDOW, count).astype(int)).tolist()
     for start in starts:
         places = range(start, start + WINDOW)
-        frames = [(drive[index], drive.labels(index)) for index in places]
-        yield make_batch([make_window(frames, 0, settings, extent_m)])
+        yield make_batch([window_of(drive, places, settings, extent_m)])
 
 
 def whole_row(name: str, parts: list[StageScores]) -> Row:

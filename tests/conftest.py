@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.util
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -137,3 +140,18 @@ def run() -> Run:
         return CliRunner().invoke(cli, [str(arg) for arg in args], input=stdin, env=env)
 
     return invoke
+
+
+@pytest.fixture(scope="session")
+def logs() -> ModuleType:
+    """The package that writes the made-up street as each data set would have recorded it."""
+    package = Path(__file__).parent / "io" / "driving" / "driving_logs"
+    spec = importlib.util.spec_from_file_location(
+        package.name, package / "__init__.py", submodule_search_locations=[str(package)]
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[package.name] = module
+    spec.loader.exec_module(module)
+    return module

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import shutil
 import sys
@@ -19,21 +18,6 @@ import lidaraccum
 from lidaraccum.geometry import rigid
 
 KINDS = ("nuscenes", "waymo", "argoverse2")
-
-
-@pytest.fixture(scope="module")
-def logs() -> ModuleType:
-    """The package that writes the made-up street, beside the tests of the readers."""
-    package = Path(__file__).parents[1] / "io" / "driving" / "driving_logs"
-    spec = importlib.util.spec_from_file_location(
-        package.name, package / "__init__.py", submodule_search_locations=[str(package)]
-    )
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[package.name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture(scope="module")

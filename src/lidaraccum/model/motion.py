@@ -42,6 +42,11 @@ class Windows:
         """For each frame the index of its window's target."""
         return [self.target[window] for window in self.of_frame]
 
+    @property
+    def sources(self) -> list[int]:
+        """The frames that are not their window's target, in order."""
+        return [frame for frame, target in enumerate(self.target_of_frame) if frame != target]
+
     def gaps(self, stamps: tuple[float, ...]) -> list[float]:
         """Seconds from the target's stamp to each frame's, F numbers."""
         return [
@@ -138,7 +143,7 @@ def warp(
 
     The target's own features stay as they are. Cells are taken to lie on the ground's plane.
     """
-    sources = [i for i, target in enumerate(windows.target_of_frame) if i != target]
+    sources = windows.sources
     if not sources:
         return base
     index = torch.tensor(sources, device=base.device)

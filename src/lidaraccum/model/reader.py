@@ -16,17 +16,13 @@ from lidaraccum.geometry import rigid
 from lidaraccum.model.batch import prepare, to_arrays, to_indices, to_tensors
 from lidaraccum.model.checkpoint import load_network
 from lidaraccum.model.motion import Windows
-from lidaraccum.model.network import FrameFeatures, Network, Perception, close_points
+from lidaraccum.model.network import FrameFeatures, Network, Perception, some_close_points
 from lidaraccum.model.precision import inference
 from lidaraccum.model.reading import FrameReading, ObjectReading, WindowReading
 from lidaraccum.model.weights import weights_hash
 
 FEWEST_POINTS = 50
 """A frame with fewer points on the grid has nothing to say."""
-
-MOST_POINTS = 200_000
-"""So many points of a window are looked at closely; of more (weights that take everything for
-movable) only every second or third."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +111,7 @@ class NetworkReader:
                 features,
                 torch.from_numpy(poses.astype(np.float32)),
                 Windows.single(len(places), places.index(target)),
-                _looked_at(features),
+                some_close_points(features),
             )
         sensor_from_level = _sensor_from_level(features, places.index(target))
         offset = to_arrays(seen.offset)
@@ -169,11 +165,6 @@ class NetworkReader:
         visible[:, shown] = counts > 0
         anchor = np.array(places)[to_indices(objects.tubes.anchor_time)]
         return ObjectReading(to_indices(objects.ids), anchor, visible, target_from_aligned)
-
-
-def _looked_at(features: FrameFeatures) -> torch.Tensor:
-    points = close_points(features)
-    return points[:: len(points) // MOST_POINTS + 1]
 
 
 def _sensor_from_level(features: FrameFeatures, order: int) -> rigid.Pose:

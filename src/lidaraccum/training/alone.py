@@ -13,7 +13,7 @@ from lidaraccum.geometry.voxel import voxel_keys
 from lidaraccum.model.batch import FrameTensors, to_arrays, to_indices
 from lidaraccum.model.kabsch import chain, invert, move
 from lidaraccum.model.motion import Windows
-from lidaraccum.model.network import FrameFeatures, Network, Perception, close_points
+from lidaraccum.model.network import FrameFeatures, Network, Perception, some_close_points
 
 VOXEL_M = 0.15
 """The paper, section 3.4: points are thinned before they are clustered."""
@@ -22,8 +22,6 @@ RADIUS_M = 0.4
 NEIGHBOURS = 5
 MIN_VOXELS = 15
 """DBSCAN of positions plus offsets, seen from above, and its least cluster; METHOD.md section 4."""
-MOST_POINTS = 200_000
-"""Of more points that pass the gate (weights that take all for movable) only every second or so."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +45,7 @@ def answer_alone(
     """What the network says of one window, with its own poses of the source frames."""
     frames, target = features.frames, windows.target[0]
     poses = own_poses(windows, target_from_source)
-    points = close_points(features)
-    points = points[:: len(points) // MOST_POINTS + 1]
-    seen = network.perceive(features, poses, windows, points)
+    seen = network.perceive(features, poses, windows, some_close_points(features))
     movable = seen.foreground > 0
     moving = movable & (seen.dynamic > 0)
     ids = torch.zeros_like(seen.point)
@@ -79,11 +75,9 @@ def move_frames(frames: FrameTensors, motion: torch.Tensor) -> torch.Tensor:
 
 def own_poses(windows: Windows, target_from_source: torch.Tensor) -> torch.Tensor:
     """(F, 4, 4) target_from_frame of all frames: proposed for the sources, identity for targets."""
-    targets = windows.target_of_frame
-    sources = [frame for frame, target in enumerate(targets) if frame != target]
     proposed = target_from_source.float()
-    poses = torch.eye(4, device=proposed.device).repeat(len(targets), 1, 1)
-    return poses.index_copy(0, torch.tensor(sources, device=proposed.device), proposed)
+    poses = torch.eye(4, device=proposed.device).repeat(sum(windows.lengths), 1, 1)
+    return poses.index_copy(0, torch.tensor(windows.sources, device=proposed.device), proposed)
 
 
 def _clusters(seen: Perception, movable: torch.Tensor) -> torch.Tensor:

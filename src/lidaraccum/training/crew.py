@@ -6,7 +6,7 @@ cores, two processes with one thread each learn nearly twice as fast as one with
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
@@ -83,10 +83,7 @@ class Crew:
         return _Mate(here, gradient)
 
     def _add(self, gradient: torch.Tensor, weight: float) -> None:
-        start = 0
-        for parameter in self._network.parameters():
-            part = gradient[start : start + parameter.numel()].view(parameter.shape)
-            start += parameter.numel()
+        for parameter, part in _parts(self._network, gradient):
             if parameter.grad is None:
                 parameter.grad = weight * part
             else:
@@ -103,15 +100,22 @@ def _work(
         except EOFError:
             return
         numbers = _learn(network, windows, settings, seed)
-        start = 0
-        for parameter in network.parameters():
-            part = gradient[start : start + parameter.numel()].view(parameter.shape)
-            start += parameter.numel()
+        for parameter, part in _parts(network, gradient):
             if parameter.grad is None:
                 part.zero_()
             else:
                 part.copy_(parameter.grad)
         pipe.send(numbers)
+
+
+def _parts(
+    network: Network, gradient: torch.Tensor
+) -> Iterator[tuple[torch.nn.Parameter, torch.Tensor]]:
+    """The network's parameters, each with its part of a flat gradient (P,), a view."""
+    parameters = list(network.parameters())
+    parts = torch.split(gradient, [parameter.numel() for parameter in parameters])
+    for parameter, part in zip(parameters, parts, strict=True):
+        yield parameter, part.view(parameter.shape)
 
 
 def _learn(

@@ -15,7 +15,7 @@ from lidaraccum.simulation.drive import simulate
 from lidaraccum.simulation.raycast import RayCaster
 from lidaraccum.simulation.windows import training_settings
 from lidaraccum.training.cutting import WindowSettings, cut_windows
-from lidaraccum.training.truth import make_window
+from lidaraccum.training.truth import window_of
 from lidaraccum.training.window import TrainingWindow
 
 __all__ = [
@@ -85,8 +85,7 @@ class ValidationDrives:
         """The one window of a drive, from 0 on."""
         drawn = training_settings(FIRST_VALIDATION_SEED + drive, _VALIDATION_FRAMES)
         sequence = simulate(replace(drawn, compensated=True), self.caster)
-        frames = [(sequence[index], sequence.labels(index)) for index in range(len(sequence))]
-        return [make_window(frames, 0, self.network, self.extent_m)]
+        return [window_of(sequence, range(len(sequence)), self.network, self.extent_m)]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from lidaraccum.data.sequence import LabelledSequence
 from lidaraccum.errors import InputError
 from lidaraccum.model.settings import NetworkSettings
-from lidaraccum.training.truth import make_window
+from lidaraccum.training.truth import window_of
 from lidaraccum.training.window import TrainingWindow
 
 EVERY = 5
@@ -55,5 +55,4 @@ class HeldOutSequences:
         places = max(1, count // _FRAMES)
         first = (drive // len(self.names)) % places * _FRAMES
         chosen = range(first, min(first + _FRAMES, count))
-        frames = [(sequence[index], sequence.labels(index)) for index in chosen]
-        return [make_window(frames, 0, self.network, self.extent_m)]
+        return [window_of(sequence, chosen, self.network, self.extent_m)]

@@ -109,8 +109,7 @@ def objective(
 
 def source_index(batch: Batch) -> torch.Tensor:
     """(B,) int64 frames that are not their window's target, in order."""
-    targets = batch.windows.target_of_frame
-    return torch.tensor([i for i, target in enumerate(targets) if i != target])
+    return torch.tensor(batch.windows.sources)
 
 
 def pillar_loss(features: FrameFeatures, truth: Truth) -> torch.Tensor:

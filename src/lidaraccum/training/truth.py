@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.data.frame import Labels
+from lidaraccum.data.sequence import LabelledSequence
 from lidaraccum.geometry import rigid
 from lidaraccum.model.batch import PreparedFrame, prepare
 from lidaraccum.model.settings import NetworkSettings
@@ -51,6 +52,17 @@ def make_window(
         known=known,
         still=still,
     )
+
+
+def window_of(
+    sequence: LabelledSequence,
+    indices: Sequence[int],
+    settings: NetworkSettings,
+    extent_m: float | None = None,
+) -> TrainingWindow:
+    """Frames of a sequence as they are, the first the target; otherwise as `make_window`."""
+    frames = [(sequence[index], sequence.labels(index)) for index in indices]
+    return make_window(frames, 0, settings, extent_m)
 
 
 def _ids(prepared: Sequence[PreparedFrame], labels: Sequence[Labels]) -> NDArray[np.int64]:

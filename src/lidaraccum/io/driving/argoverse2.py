@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lidaraccum.errors import InputError, MissingInputError
 from lidaraccum.geometry import rigid
 from lidaraccum.io.columns import Columns
-from lidaraccum.io.driving.log import DrivingLog, Sweep
+from lidaraccum.io.driving.log import DrivingLog, Sweep, nothing_in
 from lidaraccum.io.driving.poses import poses_of_parts
 from lidaraccum.io.driving.tables import Table, read_feather
 from lidaraccum.io.driving.tracks import DrawnBoxes, pose_between
@@ -73,12 +73,8 @@ class Argoverse2:
         found = tuple(sorted(path.parents[1].name for path in self._root.glob("*/sensors/lidar")))
         if not found:
             splits = sorted({path.parents[2].name for path in self._root.glob("*/*/sensors/lidar")})
-            raise MissingInputError(
-                f"{self._root} holds no Argoverse 2 log",
-                hint=f"name one split, {self._root / splits[0]}"
-                if splits
-                else "SRC is a log, or a folder of logs that hold sensors/lidar/*.feather",
-            )
+            layout = "a log, or a folder of logs that hold sensors/lidar/*.feather"
+            raise nothing_in(self._root, "Argoverse 2 log", splits, layout)
         return found
 
     def open(self, name: str) -> DrivingLog:

@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.data.frame import BoolArray, Frame, Labels
-from lidaraccum.errors import InputError
+from lidaraccum.errors import InputError, MissingInputError
 from lidaraccum.io.driving.labelling import Sighted, label
 from lidaraccum.io.driving.tracks import Track
+
+
+def nothing_in(root: Path, what: str, splits: Sequence[str], layout: str) -> MissingInputError:
+    """The error for a folder that holds no log, with the way to one where its folders hold some.
+
+    Args:
+        root: The folder.
+        what: What it should hold.
+        splits: Names of its folders that hold what it should hold.
+        layout: What SRC must be, where none does.
+    """
+    hint = f"name one split, {root / splits[0]}" if splits else f"SRC is {layout}"
+    return MissingInputError(f"{root} holds no {what}", hint=hint)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lidaraccum.errors import MissingInputError
 from lidaraccum.geometry import rigid
-from lidaraccum.io.driving.log import DrivingLog
+from lidaraccum.io.driving.log import DrivingLog, nothing_in
 from lidaraccum.io.driving.tables import read_parquet
 from lidaraccum.io.driving.waymo_segment import SECONDS, STAMP, Segment, transforms_of
 
@@ -44,12 +43,8 @@ class Waymo:
         found = tuple(sorted(path.stem for path in (self._root / "lidar").glob("*.parquet")))
         if not found:
             splits = sorted(path.parent.name for path in self._root.glob("*/lidar"))
-            raise MissingInputError(
-                f"{self._root} holds no Waymo v2 segment",
-                hint=f"name one split, {self._root / splits[0]}"
-                if splits
-                else "SRC is the folder that holds lidar/NAME.parquet, lidar_box/NAME.parquet, ...",
-            )
+            layout = "the folder that holds lidar/NAME.parquet, lidar_box/NAME.parquet, ..."
+            raise nothing_in(self._root, "Waymo v2 segment", splits, layout)
         return found
 
     def open(self, name: str) -> DrivingLog:
