@@ -129,6 +129,18 @@ def bins(drive: Drive, tmp_path: Path) -> Path:
 Run = Callable[..., Result]
 
 
+@pytest.fixture(autouse=True)
+def without_shipped_weights(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An installation without weights, but for tests marked ``shipped``.
+
+    What has no part of the network in it should not take the network's time.
+    """
+    if request.node.get_closest_marker("shipped") is None:
+        monkeypatch.setattr("lidaraccum.model.weights.shipped_weights", lambda: None)
+
+
 @pytest.fixture
 def run() -> Run:
     """`lidaraccum ARGS` as a user would enter it; the result has exit_code, stdout, stderr."""

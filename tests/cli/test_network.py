@@ -26,14 +26,6 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.fixture
-def unshipped(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An installation without weights."""
-    monkeypatch.setattr("lidaraccum.model.weights.shipped_weights", lambda: None)
-    monkeypatch.setattr("lidaraccum.pipeline.accumulator.shipped_weights", lambda: None)
-    monkeypatch.setattr("lidaraccum.evaluation.baselines.shipped_weights", lambda: None)
-
-
 def report_of(out: Path) -> dict[str, Any]:
     return json.loads(out.with_suffix(".report.json").read_text())
 
@@ -63,7 +55,6 @@ def test_no_network_is_label_free(run: Any, bins: Path, tmp_path: Path) -> None:
         np.testing.assert_array_equal(column, clouds[1][name])
 
 
-@pytest.mark.usefixtures("unshipped")
 def test_without_weights_geometry_alone_works_without_complaint(
     run: Any, bins: Path, tmp_path: Path
 ) -> None:
@@ -78,14 +69,12 @@ def test_with_shipped_weights_the_network_runs_by_default(
     run: Any, bins: Path, weights: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("lidaraccum.model.weights.shipped_weights", lambda: weights)
-    monkeypatch.setattr("lidaraccum.pipeline.accumulator.shipped_weights", lambda: weights)
     out = tmp_path / "out.npz"
     assert run("accumulate", bins, "-o", out).exit_code == 0
     assert report_of(out)["settings"]["method"] == "network"
     assert report_of(out)["weights"] == hashlib.sha256(weights.read_bytes()).hexdigest()
 
 
-@pytest.mark.usefixtures("unshipped")
 @pytest.mark.parametrize("options", [["--method", "network"], ["--weights", "gone.safetensors"]])
 def test_weights_that_are_not_there_are_said_so(
     run: Any, bins: Path, tmp_path: Path, options: list[str]
@@ -137,7 +126,6 @@ def test_evaluate_scores_the_network(run: Any, weights: Path, tmp_path: Path) ->
     assert method["weights"] == hashlib.sha256(weights.read_bytes()).hexdigest()
 
 
-@pytest.mark.usefixtures("unshipped")
 def test_evaluate_without_weights_says_so(run: Any, tmp_path: Path) -> None:
     result = run("evaluate", tmp_path, "--method", "network")
     assert result.exit_code == 3

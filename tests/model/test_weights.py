@@ -9,7 +9,7 @@ import pytest
 
 from lidaraccum.errors import MissingInputError
 from lidaraccum.model import weights
-from lidaraccum.model.weights import chosen_weights, shipped_weights, weights_hash
+from lidaraccum.model.weights import chosen_weights, weights_hash
 
 
 def test_named_weights_come_before_shipped_ones(
@@ -33,8 +33,9 @@ def test_no_weights_at_all_are_said_to_be_missing(
         chosen_weights(tmp_path / "gone.safetensors")
 
 
-def test_what_is_shipped_is_there(tmp_path: Path) -> None:
-    path = shipped_weights()
+@pytest.mark.shipped
+def test_what_is_shipped_is_there() -> None:
+    path = weights.shipped_weights()
     assert path is None or (path.is_file() and path.suffix == ".safetensors")
 
 

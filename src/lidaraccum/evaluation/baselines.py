@@ -15,7 +15,7 @@ from lidaraccum.errors import SettingsError
 from lidaraccum.evaluation.seen_through import SeenThrough
 from lidaraccum.evaluation.told_masks import ToldMasks, by_centroids, by_icp, by_tracking
 from lidaraccum.evaluation.truth import WindowTruth
-from lidaraccum.model.weights import chosen_weights, shipped_weights, weights_hash
+from lidaraccum.model.weights import available_weights, chosen_weights, weights_hash
 from lidaraccum.pipeline.accumulator import open_reader
 from lidaraccum.pipeline.label_free import LabelFree
 from lidaraccum.pipeline.network_led import NetworkLed
@@ -127,7 +127,7 @@ ALSO_CALLED = {"label-free": "cluster-icp"}
 def all_names(weights: Path | None = None) -> tuple[str, ...]:
     """Every method; the network where there are weights for it, named or shipped."""
     names = tuple(method.name for method in METHODS)
-    return (NETWORK, *names) if weights or shipped_weights() else names
+    return (NETWORK, *names) if available_weights(weights) else names
 
 
 def method_by_name(name: str, weights: Path | None = None) -> Method:

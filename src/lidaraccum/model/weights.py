@@ -17,13 +17,18 @@ def shipped_weights() -> Path | None:
     return max(folder.glob(f"*{SUFFIX}"), default=None) if folder.is_dir() else None
 
 
+def available_weights(path: Path | None) -> Path | None:
+    """The weights a user named, else those shipped, else None."""
+    return path or shipped_weights()
+
+
 def chosen_weights(path: Path | None) -> Path:
-    """The weights a user named, or those shipped when ``path`` is None.
+    """As `available_weights`, which must be there.
 
     Raises:
         MissingInputError: There are none.
     """
-    chosen = path or shipped_weights()
+    chosen = available_weights(path)
     if chosen is None:
         raise MissingInputError(
             "this installation came without weights", hint="--weights FILE names some"

@@ -16,7 +16,7 @@ from lidaraccum.data.registered import RegisteredFrame
 from lidaraccum.data.sequence import LabelledSequence, Sequence
 from lidaraccum.errors import InputError, SettingsError
 from lidaraccum.geometry import rigid
-from lidaraccum.model.weights import chosen_weights, shipped_weights
+from lidaraccum.model.weights import available_weights, chosen_weights
 from lidaraccum.pipeline.clock import StageClock
 from lidaraccum.pipeline.label_free import LabelFree
 from lidaraccum.pipeline.motion_settings import PRESETS
@@ -42,7 +42,7 @@ that came with the sequence."""
 
 def default_method(weights: Path | None = None) -> str:
     """``network`` where there are weights, named or shipped, otherwise ``label-free``."""
-    return "network" if weights or shipped_weights() else "label-free"
+    return "network" if available_weights(weights) else "label-free"
 
 
 @dataclass(frozen=True)
