@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lidaraccum.geometry import rigid
-from lidaraccum.geometry.ground import estimate_ground
+from lidaraccum.geometry.ground import STRAY_M, estimate_ground
 
 
 def street(seed: int = 0, slope: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -55,6 +55,43 @@ def test_a_stray_echo_from_below_digs_no_hole() -> None:
     above = ground.height_above(rigid.transform(ground.level_from_sensor, points))
     road = on_road(points)
     assert np.abs(above[road]).max() < 0.15
+
+
+def mirrored(points: np.ndarray, mount_m: float) -> np.ndarray:
+    """What a wet road shows of things (N, 3) that stand on it, sensor at the origin."""
+    return points * [1, 1, -1] - [0, 0, 2 * mount_m]
+
+
+def test_the_mirror_image_of_a_vehicle_in_the_road_digs_no_hole() -> None:
+    """Seen in real frames: images of a van and a cyclist, several cells wide, metres deep."""
+    rng = np.random.default_rng(0)
+    mount_m = 1.8
+    road, _ = street()
+    road[:, 2] -= mount_m
+    van = rng.uniform([9, -3, 0.1 - mount_m], [14, 0, 2 - mount_m], (800, 3))
+    cyclist = rng.uniform([-7, 3, -mount_m], [-5, 4, -0.1], (300, 3))
+    seen = np.concatenate([road, van, cyclist, mirrored(van, mount_m), mirrored(cyclist, mount_m)])
+    ground = estimate_ground(seen)
+    above = ground.height_above(rigid.transform(ground.level_from_sensor, seen))
+    off = np.abs(above[: len(road)][on_road(road)])
+    assert np.percentile(off, 75) < 0.15
+    assert off.max() < STRAY_M  # images less deep than that are still taken for ground
+    off = np.abs(above[len(road) :][: len(van)] - van[:, 2] - mount_m)
+    assert off.max() < STRAY_M
+
+
+def test_a_slope_that_begins_beyond_a_crest_is_ground() -> None:
+    """Far below the plane, but no ray to it passes through the road."""
+    rng = np.random.default_rng(0)
+    mount_m = 1.8
+    xy = rng.uniform(-40, 40, (40_000, 2))
+    crest_m = 8.0
+    fall = 0.15 * np.maximum(xy[:, 0] - crest_m, 0)
+    points = np.column_stack([xy, -fall - mount_m])
+    ground = estimate_ground(points)
+    above = ground.height_above(rigid.transform(ground.level_from_sensor, points))
+    inner = np.abs(points[:, :2]).max(axis=1) < 30
+    assert np.percentile(np.abs(above[inner]), 99) < 0.5
 
 
 def test_the_order_of_points_does_not_matter() -> None:

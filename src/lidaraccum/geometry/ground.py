@@ -27,7 +27,13 @@ STEEPEST_MOUNT = 0.5
 SLOPE = 0.2
 """Ground rises and falls by at most this against the plane (rise over run)."""
 STRAY_M = 0.7
-"""A cell this far below all that is around it holds a stray echo, not ground."""
+"""A cell this far below nearly all that is around it holds a stray echo, not ground."""
+STRAY_CELLS = 4
+"""As many cells side by side may hold strays: a mirror image of something in a wet road, say."""
+FLAT_M = 0.3
+"""A cell whose lowest point is this near the plane holds the road that no ray passes."""
+LEAST_MOUNT_M = 0.5
+"""Where the sensor seems lower than this above the road, its coordinates start elsewhere."""
 
 _CELLS = int(2 * REACH_M / CELL_M)
 _TRIALS = 200
@@ -69,7 +75,35 @@ def estimate_ground(points: NDArray[Any]) -> Ground:
     plane = _fit_plane(_lowest(points[:, :2], points[:, 2]))
     level_from_sensor = _levelling(plane)
     level = transform(level_from_sensor, points)
+    level = level[~_under_the_road(level, float(level_from_sensor[2, 3]))]
     return Ground(level_from_sensor, _follow(_lowest(level[:, :2], level[:, 2])))
+
+
+def _under_the_road(level: NDArray[Any], mount_m: float) -> NDArray[np.bool_]:
+    """Points (N,) that only a ray through the road could have met: mirror images and the like.
+
+    The road must have been seen where the ray crosses its plane, and half way from there to the
+    point nothing lower; a ditch or a slope beyond the road's edge is not under the road.
+    """
+    under = np.zeros(len(level), dtype=bool)
+    deep = np.flatnonzero(level[:, 2] < -STRAY_M)
+    if mount_m < LEAST_MOUNT_M or len(deep) == 0:
+        return under
+    shallow = level[level[:, 2] >= -STRAY_M]
+    low = _lowest(shallow[:, :2], shallow[:, 2])
+    crossing = mount_m / (mount_m - level[deep, 2])
+    at_crossing = _look_up(low, level[deep, :2] * crossing[:, None])
+    half_way = _look_up(low, level[deep, :2] * (0.5 + 0.5 * crossing)[:, None])
+    under[deep] = (np.abs(at_crossing) < FLAT_M) & ~(half_way < -FLAT_M)
+    return under
+
+
+def _look_up(low: NDArray[np.float64], xy: NDArray[Any]) -> NDArray[np.float64]:
+    """What a map (G, G) says at places (N, 2), metres; NaN beyond its edge."""
+    cells = np.floor((xy + REACH_M) / CELL_M).astype(np.int64)
+    inside = ((cells >= 0) & (cells < _CELLS)).all(axis=1)
+    cells = np.where(inside[:, None], cells, 0)
+    return np.where(inside, low[cells[:, 0], cells[:, 1]], np.nan)
 
 
 def _lowest(xy: NDArray[Any], z: NDArray[Any]) -> NDArray[np.float64]:
@@ -84,11 +118,11 @@ def _lowest(xy: NDArray[Any], z: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def _without_strays(low: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cells far below every cell around them blanked."""
+    """Cells far below all cells around them, but for a few as low, blanked."""
     around = np.ones((5, 5), dtype=bool)
     around[2, 2] = False
-    beside = ndimage.minimum_filter(
-        np.where(np.isnan(low), np.inf, low), footprint=around, mode="nearest"
+    beside = ndimage.rank_filter(
+        np.where(np.isnan(low), np.inf, low), STRAY_CELLS - 1, footprint=around, mode="nearest"
     )
     return np.asarray(np.where(low < beside - STRAY_M, np.nan, low), dtype=np.float64)
 
