@@ -101,9 +101,9 @@ def _under_the_road(level: NDArray[Any], mount_m: float) -> NDArray[np.bool_]:
 def _look_up(low: NDArray[np.float64], xy: NDArray[Any]) -> NDArray[np.float64]:
     """What a map (G, G) says at places (N, 2), metres; NaN beyond its edge."""
     cells = np.floor((xy + REACH_M) / CELL_M).astype(np.int64)
-    inside = ((cells >= 0) & (cells < _CELLS)).all(axis=1)
-    cells = np.where(inside[:, None], cells, 0)
-    return np.where(inside, low[cells[:, 0], cells[:, 1]], np.nan)
+    inside = np.asarray(((cells >= 0) & (cells < _CELLS)).all(axis=1))
+    cells[~inside] = 0
+    return np.asarray(np.where(inside, low[cells[:, 0], cells[:, 1]], np.nan), dtype=np.float64)
 
 
 def _lowest(xy: NDArray[Any], z: NDArray[Any]) -> NDArray[np.float64]:
