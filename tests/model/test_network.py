@@ -51,6 +51,11 @@ def test_one_network_takes_any_number_of_frames(
     assert torch.isfinite(seen.offset).all()
 
 
+def test_a_frame_alone_has_nothing_to_match(network: Network, frames: list[Frame]) -> None:
+    match = network.match_windows(encode(network, frames[:1], 16.0), Windows.single(1))
+    assert match.target_from_source.shape == (0, 4, 4)
+
+
 def test_the_order_of_points_does_not_matter(network: Network, frames: list[Frame]) -> None:
     rng = np.random.default_rng(0)
     orders = [rng.permutation(len(frame)) for frame in frames[:3]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -74,7 +75,7 @@ class EgoMatch:
         source_valid: (B, N) bool.
         target_valid: (B, N) bool.
         rounds: The motion between level coordinates after each round of matching, the last one's
-            being the answer.
+            being the answer; first the motion begun with, where one was given.
     """
 
     target_from_source: torch.Tensor
@@ -85,6 +86,35 @@ class EgoMatch:
     source_valid: torch.Tensor
     target_valid: torch.Tensor
     rounds: tuple[torch.Tensor, ...]
+
+    def pick(self, index: torch.Tensor) -> EgoMatch:
+        """Pairs (K,) int64, in that order."""
+        return EgoMatch(
+            self.target_from_source[index],
+            self.level_target_from_source[index],
+            self.source[index],
+            self.row_mass[index],
+            self.column_mass[index],
+            self.source_valid[index],
+            self.target_valid[index],
+            tuple(motion[index] for motion in self.rounds),
+        )
+
+    @staticmethod
+    def stack(parts: Sequence[EgoMatch]) -> EgoMatch:
+        """Several put one after another."""
+        return EgoMatch(
+            torch.cat([part.target_from_source for part in parts]),
+            torch.cat([part.level_target_from_source for part in parts]),
+            torch.cat([part.source for part in parts]),
+            torch.cat([part.row_mass for part in parts]),
+            torch.cat([part.column_mass for part in parts]),
+            torch.cat([part.source_valid for part in parts]),
+            torch.cat([part.target_valid for part in parts]),
+            tuple(
+                torch.cat(motions) for motions in zip(*(part.rounds for part in parts), strict=True)
+            ),
+        )
 
 
 class EgoHead(nn.Module):
@@ -178,16 +208,33 @@ class Matcher(nn.Module):
         self.sinkhorn_rounds = settings.sinkhorn_rounds
         self.fastest_mps = settings.fastest_mps
 
-    def forward(self, source: EgoPillars, target: EgoPillars, gap_s: torch.Tensor) -> EgoMatch:
-        """Motions between B pairs of frames, ``gap_s`` (B,) seconds apart; float32 throughout."""
+    def forward(
+        self,
+        source: EgoPillars,
+        target: EgoPillars,
+        gap_s: torch.Tensor,
+        start: torch.Tensor | None = None,
+    ) -> EgoMatch:
+        """Motions between B pairs of frames; float32 throughout.
+
+        Args:
+            source: B frames.
+            target: B frames.
+            gap_s: (B,) seconds between them.
+            start: (B, 4, 4) motions between level coordinates, good to the first of ``rematch_m``:
+                what is already near them is matched, and the first round is spared.
+        """
         with exactly(source.position):
             impossible = ~(source.valid[:, :, None] & target.valid[:, None, :])
-            reach = (self.fastest_mps * gap_s.abs()).clamp_min(_LEAST_REACH_M)
-            apart = torch.cdist(source.position[..., :2], target.position[..., :2])
-            near = torch.zeros_like(apart).masked_fill_(
-                impossible | (apart > reach[:, None, None]), -torch.inf
-            )
-            motion, row_mass, column_mass = self._fit(source, target, near, 0)
+            if start is None:
+                reach = (self.fastest_mps * gap_s.abs()).clamp_min(_LEAST_REACH_M)
+                apart = torch.cdist(source.position[..., :2], target.position[..., :2])
+                near = torch.zeros_like(apart).masked_fill_(
+                    impossible | (apart > reach[:, None, None]), -torch.inf
+                )
+                motion, row_mass, column_mass = self._fit(source, target, near, 0)
+            else:
+                motion = start
             rounds = [motion]
             for number, near_m in enumerate(self.rematch_m, start=1):
                 placed = move(motion.detach(), source.position)

@@ -15,6 +15,7 @@ from lidaraccum.model.kabsch import about, chain, invert, move
 from lidaraccum.model.motion import MotionMap, PointHead, Windows, read
 from lidaraccum.model.pillars import PillarEncoder
 from lidaraccum.model.settings import NetworkSettings
+from lidaraccum.model.steady import outward, steady
 from lidaraccum.model.tube import TubeMotions, TubeNet, Tubes, gather_tubes
 from lidaraccum.model.unet import UNet, channels_last, convolution
 
@@ -170,14 +171,31 @@ class Network(nn.Module):
     def match_windows(self, features: FrameFeatures, windows: Windows) -> EgoMatch:
         """Each source frame straight to its window's target, in the frames' order.
 
-        The targets themselves are left out: B is the number of frames less that of windows.
+        The targets themselves are left out: B is the number of frames less that of windows. The
+        targets' neighbours are matched first, within all reach; each further frame is matched to
+        the target too, but from where steady motion of the nearer ones puts it.
         """
         device = features.base.device
-        pairs = [(i, windows.target_of_frame[i]) for i in windows.sources]
-        source, target = torch.tensor(pairs, device=device).reshape(-1, 2).T
         stamps = features.frames.stamps
-        gaps = torch.tensor([stamps[i] - stamps[t] for i, t in pairs], device=device)
-        return self.matcher(features.ego.pick(source), features.ego.pick(target), gaps.float())
+        known = torch.eye(4, device=device).repeat(len(features), 1, 1)
+        matches: list[EgoMatch] = []
+        order: list[int] = []
+        for sources in outward(windows) or [[]]:
+            targets = [windows.target_of_frame[frame] for frame in sources]
+            rows = torch.tensor([sources, targets], dtype=torch.int64, device=device)
+            source, target = rows
+            gaps = [stamps[i] - stamps[t] for i, t in zip(sources, targets, strict=True)]
+            match = self.matcher(
+                features.ego.pick(source),
+                features.ego.pick(target),
+                torch.tensor(gaps, device=device).float(),
+                steady(known, stamps, sources, windows) if matches else None,
+            )
+            known = known.index_copy(0, source, match.level_target_from_source.detach())
+            matches.append(match)
+            order += sources
+        back = torch.argsort(torch.tensor(order, dtype=torch.int64, device=device))
+        return EgoMatch.stack(matches).pick(back)
 
     def perceive(
         self,
