@@ -13,6 +13,8 @@ from lidaraccum.model.unet import UNet, linear
 
 _TIMES = 3
 _POINT_PLACE = 4
+_TYPICAL_MPS = 10.0
+"""Velocities are said in this measure."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,8 +195,9 @@ def read(
 class PointHead(nn.Module):
     """A point's motion features, and what they say: foreground, dynamic, offset.
 
-    Source: the paper, equations 3 and 4. Ours: its own frame's base features are read too, and
-    the foreground is judged once more with the whole window in view.
+    Source: the paper, equations 3 and 4. Ours: its own frame's base features are read too, the
+    foreground is judged once more with the whole window in view, and an offset is the way to the
+    centre of the object where the point is, plus a velocity times the time to the target.
     """
 
     def __init__(self, settings: NetworkSettings) -> None:
@@ -210,7 +213,7 @@ class PointHead(nn.Module):
         )
         self.foreground = nn.Linear(channels, 1)
         self.dynamic = nn.Linear(channels, 1)
-        self.offset = nn.Sequential(linear(channels, 64), nn.ReLU(), nn.Linear(64, 2))
+        self.offset = nn.Sequential(linear(channels, 64), nn.ReLU(), nn.Linear(64, 4))
 
     def forward(
         self, motion: torch.Tensor, base: torch.Tensor, place: torch.Tensor
@@ -223,9 +226,10 @@ class PointHead(nn.Module):
             place: (Q, 4) place in its pillar (2, in pillars), height, seconds from the target.
         """
         feature = self.mix(torch.cat([motion, base, self.place(place).to(motion.dtype)], dim=1))
+        centre, velocity = self.offset(feature).float().split(2, dim=1)
         return (
             feature,
             self.foreground(feature)[:, 0].float(),
             self.dynamic(feature)[:, 0].float(),
-            self.offset(feature).float(),
+            centre - place[:, 3:] * (_TYPICAL_MPS * velocity),
         )
