@@ -11,7 +11,7 @@ import torch
 
 from lidaraccum.model.batch import prepare, to_tensors
 from lidaraccum.model.motion import Windows
-from lidaraccum.model.network import build_network
+from lidaraccum.model.network import build_network, presence_map
 from lidaraccum.model.precision import has_bfloat16, inference
 from lidaraccum.simulation.drive import simulate
 from lidaraccum.simulation.settings import DriveSettings
@@ -49,7 +49,9 @@ def main() -> None:
         timed("match (four pairs)", lambda: network.match_windows(features, windows))
         timed(
             "of perceive: motion map",
-            lambda: network.motion_map(features.base, poses, windows, tensors.stamps, 32.0),
+            lambda: network.motion_map(
+                features.base, presence_map(features), poses, windows, tensors.stamps, 32.0
+            ),
         )
         seen = timed("perceive", lambda: network.perceive(features, poses, windows, points))
         ids = torch.arange(len(points)) % 30

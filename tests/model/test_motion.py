@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 
 from lidaraccum.model.kabsch import invert
-from lidaraccum.model.motion import Windows, read, warp
+from lidaraccum.model.motion import Windows, moments, read, warp
 
 
 def ramp(size: int = 32) -> torch.Tensor:
@@ -34,3 +34,22 @@ def test_warped_features_lie_where_the_pose_puts_them() -> None:
     there = read(warped, torch.ones(2).long(), xy, 4.0)
     back = invert(pose)
     torch.testing.assert_close(there, xy @ back[:2, :2].T + back[:2, 3], atol=1e-5, rtol=1e-5)
+
+
+def test_the_time_a_place_was_taken_rises_along_the_way() -> None:
+    """By one frame's time over one frame's way; where something stands it is the same all over."""
+    taken = torch.zeros(5, 32, 32)
+    for frame in range(5):
+        taken[frame, 4 + 3 * frame : 16 + 3 * frame, 5:9] = 1.0  # goes three cells a frame
+        taken[frame, 8:20, 20:24] = 1.0
+    seconds = 0.1 * torch.arange(5)
+    times = torch.stack([seconds, seconds, (seconds == 0).float()], dim=1)
+    often, mean, spread, at_target = moments(taken, times)
+    slope = torch.diff(mean[4:28, 6])
+    assert float(slope.min()) > -1e-6
+    middle = torch.diff(mean[4:28:3, 6]) / (0.1 / 0.4)
+    assert float(middle.median()) > 0.4
+    assert float(mean[8:20, 21].std()) == 0.0
+    assert float(spread[10, 21]) > float(spread[5, 6])
+    assert torch.equal(at_target, taken[0])
+    torch.testing.assert_close(often[8:20, 20:24], torch.ones(12, 4))

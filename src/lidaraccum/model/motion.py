@@ -13,8 +13,11 @@ from lidaraccum.model.unet import UNet, linear
 
 _TIMES = 3
 _POINT_PLACE = 4
+_MOMENTS = 4
+_TYPICAL_S = 0.4
+_HARDLY_TAKEN = 0.1
 _TYPICAL_MPS = 10.0
-"""Velocities are said in this measure."""
+"""Velocities and times are said in these measures."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +66,10 @@ class MotionMap(nn.Module):
     Base features are warped at full resolution, where a pedestrian's step is still seen, and
     compared at half. Time is mixed by 1 x 1 convolutions over three neighbouring frames between
     3 x 3 ones over space, which costs a third of 3 x 3 x 3; the maximum over time takes any T.
+    Beside the maximum goes when each place was taken by something movable: the slope of that time
+    over the ground is how slowly and which way it went, across any number of cells.
 
-    Source: the paper, section 3.3.
+    Source: the paper, section 3.3; the times are ours.
     """
 
     def __init__(self, settings: NetworkSettings) -> None:
@@ -76,11 +81,12 @@ class MotionMap(nn.Module):
         self.blocks = nn.ModuleList(
             _TemporalBlock(channels) for _ in range(settings.temporal_blocks)
         )
-        self.unet = UNet(channels, settings.motion_widths)
+        self.unet = UNet(channels + _MOMENTS, settings.motion_widths)
 
     def forward(
         self,
         base: torch.Tensor,
+        presence: torch.Tensor,
         target_from_frame: torch.Tensor,
         windows: Windows,
         stamps: tuple[float, ...],
@@ -90,19 +96,47 @@ class MotionMap(nn.Module):
 
         Args:
             base: (F, C, S, S) base features, each in its own level coordinates.
+            presence: (F, 1, S, S) 0..1: how likely something movable was met there.
             target_from_frame: (F, 4, 4) between level coordinates.
             windows: Which frames belong together.
             stamps: Seconds of the F frames.
             half_extent_m: Half the side of the grid, metres.
         """
-        warped = warp(base, target_from_frame, windows, half_extent_m)
+        both = torch.cat([base, presence.to(base.dtype)], dim=1)
+        warped = warp(both, target_from_frame, windows, half_extent_m)
         times = _times(windows, stamps, base.device)
-        stack = torch.relu(self.halve(warped) + self.clock(times)[:, :, None, None])
+        stack = torch.relu(self.halve(warped[:, :-1]) + self.clock(times)[:, :, None, None])
         before, after = _neighbours(windows, base.device)
         for block in self.blocks:
             stack = block(stack, before, after)
-        tallest = [part.amax(dim=0) for part in torch.split(stack, list(windows.lengths))]
-        return self.unet(torch.stack(tallest).contiguous(memory_format=torch.channels_last))
+        lengths = list(windows.lengths)
+        taken = nn.functional.max_pool2d(warped[:, -1:].float(), 2)[:, 0]
+        parts = zip(
+            torch.split(stack, lengths),
+            torch.split(taken, lengths),
+            torch.split(times, lengths),
+            strict=True,
+        )
+        maps = [
+            torch.cat([part.amax(dim=0), moments(own, when).to(part.dtype)])
+            for part, own, when in parts
+        ]
+        return self.unet(torch.stack(maps).contiguous(memory_format=torch.channels_last))
+
+
+def moments(taken: torch.Tensor, times: torch.Tensor) -> torch.Tensor:
+    """(4, H, H): how often places were taken, when on average, spread how far, and at the target.
+
+    Args:
+        taken: (T, H, H) 0..1.
+        times: (T, 3): seconds from the target, their size, 1 for the target.
+    """
+    when = (times[:, 0] / _TYPICAL_S)[:, None, None]
+    total = taken.sum(dim=0) + _HARDLY_TAKEN
+    mean = (taken * when).sum(dim=0) / total
+    spread = ((taken * (when - mean) ** 2).sum(dim=0) / total).sqrt()
+    at_target = (taken * times[:, 2, None, None]).sum(dim=0)
+    return torch.stack([taken.mean(dim=0), mean, spread, at_target])
 
 
 class _TemporalBlock(nn.Module):

@@ -225,7 +225,8 @@ class Network(nn.Module):
             invert(frames.level_from_sensor),
         )
         half = frames.half_extent_m
-        motion_map = self.motion_map(base, level, windows, frames.stamps, half)
+        presence = presence_map(features)
+        motion_map = self.motion_map(base, presence, level, windows, frames.stamps, half)
         point = close_points(features) if points is None else points
         frame = frames.point_frame[point]
         xyz = frames.points[point]
@@ -282,6 +283,16 @@ class Network(nn.Module):
             motions=motions,
             target_from_aligned=about(motions.anchor_from_time[-1], -tubes.anchor[:, None]),
         )
+
+
+def presence_map(features: FrameFeatures) -> torch.Tensor:
+    """(F, 1, S, S) probability of foreground in occupied pillars, 0 elsewhere; no gradient."""
+    frames = features.frames
+    area = frames.cells * frames.cells
+    flat = features.foreground.new_zeros(len(frames) * area)
+    places = frames.pillar_frame * area + frames.pillar_cell
+    flat = flat.index_copy(0, places, features.foreground.detach().sigmoid())
+    return flat.view(len(frames), 1, frames.cells, frames.cells)
 
 
 def close_points(features: FrameFeatures) -> torch.Tensor:
