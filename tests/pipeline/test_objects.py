@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from lidaraccum.data.frame import Frame
+from lidaraccum.data.registered import RegisteredFrame, RegistrationQuality
 from lidaraccum.geometry import rigid
 from lidaraccum.pipeline.courses import course
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import BALANCED
 from lidaraccum.pipeline.search import find_objects
 from lidaraccum.pipeline.suspects import Template, make_template
-from lidaraccum.pipeline.verdict import judge, refine_velocity
+from lidaraccum.pipeline.verdict import as_met, judge, refine_velocity, slide_velocity
 
 CAR_VELOCITY = np.array([-8.0, 0.0, 0.0])
 
@@ -110,7 +111,7 @@ def test_a_turning_car_is_explained_by_its_turn(frames: list[SightedFrame]) -> N
         )
         for one in frames
     ]
-    template = Template(corner[::8], corner[::8, 2], 0.0, centre)
+    template = Template(corner[::8], corner[::8, 2], 0.0, np.zeros(len(corner[::8])), centre)
     for frame in turning:
         frame.near_heights = frame.near_points[:, 2]
     rivals = np.stack([np.zeros(3), velocity, velocity])
@@ -120,3 +121,52 @@ def test_a_turning_car_is_explained_by_its_turn(frames: list[SightedFrame]) -> N
         template, velocity + np.array([0.5, -0.4, 0.0]), turning, BALANCED, turn
     )
     np.testing.assert_allclose(refined, velocity, atol=0.2)
+
+
+def test_a_truck_is_not_slid_along_its_own_side(look: Any, new_mover: Any) -> None:
+    """Its long side has partners wherever it goes; its ends tell, and make it one thing."""
+    velocity = np.array([-22.0, 0.0, 0.0])
+    truck = new_mover(low=(7.0, 1.6, 0.1), size=(14.0, 2.4, 3.2), velocity=tuple(velocity))
+    street = look([truck], count=5, speed=10.0)
+    frames = window(street)
+    found = find_objects(frames, BALANCED)
+    assert len(found) == 1
+    np.testing.assert_allclose(found[0].velocity, velocity, atol=1.0)
+    shares = []
+    for frame, on in zip(frames, street.on, strict=True):
+        mine = np.flatnonzero(on[frame.rows] == 1)
+        picked = found[0].picked[frame.index]
+        shares.append(len(np.intersect1d(picked, mine)) / len(mine))
+        assert len(np.setdiff1d(picked, mine)) < 0.05 * len(mine)
+    assert np.mean(shares) > 0.75
+
+
+def test_a_slide_finds_its_way_back(frames: list[SightedFrame], car: Template) -> None:
+    for wrong in (-2.0, 1.5):
+        start = CAR_VELOCITY * (1 + wrong / 8.0)
+        back = slide_velocity(car, start, frames, BALANCED)
+        assert np.linalg.norm(back - CAR_VELOCITY) < 0.4
+    assert np.array_equal(slide_velocity(car, np.zeros(3), frames, BALANCED), np.zeros(3))
+
+
+def test_what_moves_is_met_when_the_sweep_comes_by() -> None:
+    """A sweep begins behind and takes 0.1 s; where nothing tells the time, it takes none."""
+    rng = np.random.default_rng(0)
+    azimuth = rng.uniform(-np.pi, np.pi, 4000)
+    place = np.column_stack([12 * np.cos(azimuth), 12 * np.sin(azimuth), rng.uniform(-1, 1, 4000)])
+    quality = RegistrationQuality("given", 1.0, 0.0)
+    swept = RegisteredFrame(
+        1, Frame(place.astype(np.float32), stamp=0.1), np.eye(4), quality,
+        seconds_from_stamp=(azimuth * 0.1 / (2 * np.pi)).astype(np.float32),
+    )  # fmt: skip
+    frame = SightedFrame(swept, BALANCED)
+    velocity = np.array([15.0, 0.0, 0.0])
+    ahead = np.array([[0.0, 8.0, 0.0]])  # a quarter turn after the stamp: 0.025 s
+    met = as_met(ahead, velocity, np.array([-0.01]), frame)
+    np.testing.assert_allclose(met, ahead + velocity * (0.025 + 0.01), atol=0.03)
+    untimed = SightedFrame(replace(swept, seconds_from_stamp=None), BALANCED)
+    np.testing.assert_array_equal(as_met(ahead, velocity, np.zeros(1), untimed), ahead)
+    picked = np.arange(len(frame.rows))
+    at_stamp = frame.world_at_stamp(picked, velocity)
+    later = (frame.points - at_stamp)[:, 0] / 15.0
+    np.testing.assert_allclose(later, azimuth[frame.rows] * 0.1 / (2 * np.pi), atol=1e-4)

@@ -24,6 +24,11 @@ no more than this: the next frame's beams hit the same wall at other heights."""
 FARTHEST_ECHO_M = 1_000.0
 """Farther points are damage, not echoes."""
 
+LONGEST_SWEEP_S = 0.25
+"""A time per point that reaches farther from the stamp is no time within one sweep."""
+
+AZIMUTH_BINS = 360
+
 LOW_SHARE = 0.4
 """Points above this share of the least height count as partners and join what stands on them."""
 
@@ -39,6 +44,7 @@ class SightedFrame:
         low_rows: (L,) int64: rows of points lower than obstacles but above the ground.
         near_points: (M + L, 3) float64, metres, sensor coordinates: obstacles, then low points.
         near_heights: (M + L,) metres above the ground.
+        seconds: (M,) after the stamp, when each obstacle was met; 0 where nothing tells.
         segments: (M,) int64: each obstacle's cluster within this frame.
         segment_sizes: (S,) obstacles in each cluster.
         through: (M,) int16: other frames that saw through the place.
@@ -64,6 +70,7 @@ class SightedFrame:
         near = np.concatenate([self.rows, self.low_rows])
         self.near_points = points[near].astype(np.float64)
         self.near_heights = heights[near]
+        self.seconds = _seconds_within_sweep(registered)[self.rows]
         self.segments = connected_cells(self.points, settings.cell_m)
         self.segment_sizes = np.bincount(self.segments)
         self.through = np.zeros(len(self.rows), dtype=np.int16)
@@ -126,6 +133,37 @@ class SightedFrame:
         """Some of the obstacles (K,) in the world, (K, 3) metres."""
         return rigid.transform(self.world_from_sensor, self.points[picked])
 
+    def world_at_stamp(
+        self, picked: NDArray[np.int64], velocity: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """As `world`, but where a thing of that velocity (3,) had those points at the stamp."""
+        return self.world(picked) - self.seconds[picked, None] * velocity
+
+    def seconds_at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """When after the stamp the sweep passed points (N, 3), sensor coordinates: (N,) seconds."""
+        if not self.is_timed:
+            return np.zeros(len(points))
+        return self._seconds_by_azimuth[_azimuth_bins(points)]
+
+    @cached_property
+    def is_timed(self) -> bool:
+        """Whether it is known when each point was met."""
+        return bool(self.seconds.any())
+
+    @cached_property
+    def _seconds_by_azimuth(self) -> NDArray[np.float64]:
+        bins = _azimuth_bins(self.points)
+        counts = np.bincount(bins, minlength=AZIMUTH_BINS)
+        sums = np.bincount(bins, self.seconds, minlength=AZIMUTH_BINS)
+        full = np.flatnonzero(counts)
+        about = np.concatenate([full - AZIMUTH_BINS, full, full + AZIMUTH_BINS])
+        means = np.tile(sums[full] / counts[full], 3)
+        after = np.searchsorted(about, np.arange(AZIMUTH_BINS))
+        before = after - 1
+        bin_ = np.arange(AZIMUTH_BINS)
+        nearest = np.where(about[after] - bin_ < bin_ - about[before], after, before)
+        return np.asarray(means[nearest])
+
     def world_of_near(self) -> NDArray[np.float64]:
         """Obstacles and low points in the world, (M + L, 3) metres."""
         return rigid.transform(self.world_from_sensor, self.near_points)
@@ -136,3 +174,16 @@ class SightedFrame:
         sighting = self.view.look(rigid.transform(sensor_from_other, other.points))
         other.through += sighting.through
         other.met += sighting.met
+
+
+def _seconds_within_sweep(registered: RegisteredFrame) -> NDArray[np.float64]:
+    """When after the stamp each of N points was met; 0 where nothing tells, or nothing credible."""
+    seconds = registered.seconds_from_stamp
+    if seconds is None or not np.abs(seconds).max(initial=0.0) <= LONGEST_SWEEP_S:
+        return np.zeros(len(registered.frame))
+    return seconds.astype(np.float64)
+
+
+def _azimuth_bins(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    turns = np.arctan2(points[:, 1], points[:, 0]) / (2 * np.pi)
+    return np.asarray((turns * AZIMUTH_BINS).astype(np.int64) % AZIMUTH_BINS)

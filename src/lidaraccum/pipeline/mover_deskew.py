@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 
 from lidaraccum.data.perceived import PerceivedFrame
 from lidaraccum.geometry import rigid
+from lidaraccum.pipeline.freespace import LONGEST_SWEEP_S
 from lidaraccum.registration.deskew import transform_along
-
-MAX_OFFSET_S = 0.25
-"""A time per point that reaches farther from the stamp is no time within one sweep."""
 
 MAX_APART_S = 1.0
 """Frames farther apart say little of how a thing moves at one of them."""
@@ -92,7 +90,7 @@ def _undone(
     perceived, sightings = sighted
     registered = perceived.registered
     seconds = registered.seconds_from_stamp
-    if seconds is None or not sightings or not np.abs(seconds).max(initial=0.0) <= MAX_OFFSET_S:
+    if seconds is None or not sightings or not np.abs(seconds).max(initial=0.0) <= LONGEST_SWEEP_S:
         return perceived
     points = registered.frame.points.copy()
     poses = dict(perceived.world_from_object)

@@ -10,12 +10,20 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from lidaraccum.geometry import rigid
+from lidaraccum.geometry.clustering import connected_cells
 from lidaraccum.geometry.voxel import thin
-from lidaraccum.pipeline.courses import course
+from lidaraccum.pipeline.courses import course, turned
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.suspects import Suspect, Template, make_template
-from lidaraccum.pipeline.verdict import Verdict, judge, judge_points, refine_velocity
+from lidaraccum.pipeline.verdict import (
+    Verdict,
+    as_met,
+    judge,
+    judge_points,
+    refine_velocity,
+    slide_velocity,
+)
 
 TEMPLATE_POINTS = 80
 FIRST_LOOK_POINTS = 30
@@ -29,6 +37,8 @@ WHOLE_GROWTH = 2.5
 """A frame's points this near to the moved cluster are its points; so is all of a cluster of which
 they are more than this share, unless it has so many times the points."""
 
+GATHERINGS = 3
+
 STANDING_SHARE = 0.1
 STANDING_MARGIN = 0.1
 """With more than this share of points that were met and never seen through, each is asked whether
@@ -37,6 +47,13 @@ standing costs it so much less than moving."""
 SAME_GAP_M = 0.8
 SAME_SPEED_MPS = 0.8
 """Two movers nearer than this and with velocities as like as this are one."""
+
+LIKE_SPEED_MPS = 2.0
+LIKE_SPEED_SHARE = 0.3
+NO_WORSE = 0.05
+"""So are two whose velocities differ by less than this and this share of the speed, where one of
+the motions costs the other's points at most so much more than their own: the long side of a truck
+fits many velocities, its ends one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,10 +133,11 @@ def explain(
     if not _is_motion(best, rivals, verdict, frames, settings):
         return None
     turn = float(turning[best])
-    picked = gather(suspect, rivals[best], frames, turn)
+    velocity = slide_velocity(template, rivals[best], probes, settings, turn)
+    picked = gather(suspect, velocity, frames, settings, turn)
     return WindowObject(
-        picked=without_standing(picked, rivals[best], frames, settings),
-        velocity=rivals[best],
+        picked=without_standing(picked, velocity, frames, settings),
+        velocity=velocity,
         centre=suspect.centre,
         stamp=own.stamp,
         margin=float(verdict.cost[0] - verdict.cost[best]),
@@ -150,27 +168,75 @@ def gather(
     suspect: Suspect,
     velocity: NDArray[np.float64],
     frames: Sequence[SightedFrame],
+    settings: MotionSettings,
     turn: float = 0.0,
 ) -> dict[int, NDArray[np.int64]]:
-    """By frame index: the obstacles (K,) of each frame that the moved suspect lies on."""
-    own = frames[suspect.frame]
-    world, heights = own.world(suspect.picked), own.heights[suspect.picked]
-    gathered = {own.index: suspect.picked}
+    """By frame index: the obstacles (K,) of each frame that the moved suspect lies on.
+
+    A suspect may be no more than the end of a truck that was seen through. So what the fullest
+    frame shows of it is moved to all others in turn, as long as another becomes the fullest; but
+    not what stands or hides there, and then only clusters that are its as a whole are added: a
+    wall it touches goes on and on.
+    """
+    source = frames[suspect.frame]
+    gathered = {source.index: suspect.picked}
+    for number in range(GATHERINGS):
+        there = turned(velocity, turn * (source.stamp - frames[suspect.frame].stamp))
+        picked = gathered[source.index]
+        if number:
+            own = without_standing({source.index: picked}, there, frames, settings)
+            picked = _accused_parts(own.get(source.index, picked[:0]), source, settings)
+        if len(picked) == 0:
+            break
+        found = _lain_on(source, picked, there, frames, turn, whole_only=number > 0)
+        for index, picked in found.items():
+            known = gathered.get(index)
+            gathered[index] = picked if known is None else np.union1d(known, picked)
+        fullest = max(frames, key=lambda frame: len(gathered.get(frame.index, ())))
+        if fullest is source:
+            break
+        source = fullest
+    return gathered
+
+
+def _accused_parts(
+    picked: NDArray[np.int64], frame: SightedFrame, settings: MotionSettings
+) -> NDArray[np.int64]:
+    """The picked obstacles (K,) in parts that others saw through; not what nobody could see."""
+    part = connected_cells(frame.points[picked], settings.cell_m)
+    share = np.bincount(part, frame.through[picked] > 0) / np.maximum(np.bincount(part), 1)
+    return picked[share[part] >= settings.seed_share]
+
+
+def _lain_on(
+    own: SightedFrame,
+    picked: NDArray[np.int64],
+    velocity: NDArray[np.float64],
+    frames: Sequence[SightedFrame],
+    turn: float,
+    *,
+    whole_only: bool,
+) -> dict[int, NDArray[np.int64]]:
+    """By frame index: the obstacles (K,) of other frames that some of this one's, moved, lie on."""
+    world, heights = own.world(picked), own.heights[picked]
+    gathered = {}
     for frame in frames:
         if frame is own:
             continue
         seconds = frame.stamp - own.stamp
         moved = world + velocity * seconds
         if turn:
-            moved = rigid.transform(course(suspect.centre, velocity, turn, seconds), world)
-        local = rigid.transform(frame.sensor_from_world, moved)
-        picked = _points_at(frame, frame.places(local, heights))
-        if len(picked):
-            gathered[frame.index] = picked
+            moved = rigid.transform(course(world.mean(axis=0), velocity, turn, seconds), world)
+        local = as_met(moved, velocity, own.seconds[picked], frame)
+        found = _points_at(frame, frame.places(local, heights), whole_only=whole_only)
+        if len(found):
+            gathered[frame.index] = found
     return gathered
 
 
-def _points_at(frame: SightedFrame, places: NDArray[np.float64]) -> NDArray[np.int64]:
+def _points_at(
+    frame: SightedFrame, places: NDArray[np.float64], *, whole_only: bool
+) -> NDArray[np.int64]:
     x, y = frame.level
     low, high = places.min(axis=0) - JOIN_M, places.max(axis=0) + JOIN_M
     about = np.flatnonzero((x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]))
@@ -183,7 +249,8 @@ def _points_at(frame: SightedFrame, places: NDArray[np.float64]) -> NDArray[np.i
     shares = np.bincount(frame.segments[close], minlength=len(sizes)) / sizes
     whole = (shares > WHOLE_SHARE) & (sizes < WHOLE_GROWTH * len(places))
     keep = whole[frame.segments]
-    keep[close] = True
+    if not whole_only:
+        keep[close] = True
     return np.flatnonzero(keep)
 
 
@@ -203,7 +270,9 @@ def without_standing(
         if len(doubtful) > STANDING_SHARE * len(mine):
             sample = doubtful[thin(frame.points[doubtful], 0.2)]
             world = frame.world(sample)
-            template = Template(world, frame.heights[sample], frame.stamp, world.mean(axis=0))
+            template = Template(
+                world, frame.heights[sample], frame.stamp, frame.seconds[sample], world.mean(axis=0)
+            )
             rivals = np.stack([np.zeros(3), velocity])
             cost, _ = judge_points(template, rivals, frames, settings)
             stands = cost[0] + STANDING_MARGIN < cost[1]
@@ -215,28 +284,60 @@ def without_standing(
 
 
 def join_parts(
-    objects: Sequence[WindowObject], frames: Sequence[SightedFrame]
+    objects: Sequence[WindowObject], frames: Sequence[SightedFrame], settings: MotionSettings
 ) -> list[WindowObject]:
-    """Movers that touch and move alike made one; the largest part's motion stands for all."""
+    """Movers that touch and move alike, or as well, made one.
+
+    The largest part's motion stands for all, unless only a smaller one's explains both.
+    """
     joined: list[WindowObject] = []
     for part in objects:
         for place, whole in enumerate(joined):
-            if _are_one(part, whole, frames):
-                joined[place] = _united(whole, part)
+            united = _united_if_one(part, whole, frames, settings)
+            if united is not None:
+                joined[place] = united
                 break
         else:
             joined.append(part)
     return joined
 
 
-def _are_one(part: WindowObject, whole: WindowObject, frames: Sequence[SightedFrame]) -> bool:
-    if np.linalg.norm(part.velocity - whole.velocity) > SAME_SPEED_MPS:
-        return False
+def _united_if_one(
+    part: WindowObject,
+    whole: WindowObject,
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+) -> WindowObject | None:
+    apart = float(np.linalg.norm(part.velocity - whole.velocity))
+    speed = float(np.linalg.norm(whole.velocity))
+    if apart > LIKE_SPEED_MPS + LIKE_SPEED_SHARE * speed or not _touch(part, whole, frames):
+        return None
+    if apart < SAME_SPEED_MPS or _goes_with(part, whole, frames, settings):
+        return _united(whole, part)
+    return _united(part, whole) if _goes_with(whole, part, frames, settings) else None
+
+
+def _goes_with(
+    one: WindowObject, other: WindowObject, frames: Sequence[SightedFrame], settings: MotionSettings
+) -> bool:
+    """Whether another's motion explains a mover's points as well as its own."""
+    own = max(frames, key=lambda frame: len(one.picked.get(frame.index, ())))
+    template = make_template(own, one.picked[own.index], TEMPLATE_POINTS)
+    velocities = [
+        turned(mover.velocity, mover.turn * (own.stamp - mover.stamp)) for mover in (one, other)
+    ]
+    turns = np.array([one.turn, other.turn])
+    cost = judge(template, np.stack(velocities), frames, settings, turns).cost
+    return bool(cost[1] < cost[0] + NO_WORSE)
+
+
+def _touch(part: WindowObject, whole: WindowObject, frames: Sequence[SightedFrame]) -> bool:
     for frame in frames:
         if frame.index in part.picked and frame.index in whole.picked:
             body = cKDTree(frame.points[whole.picked[frame.index]])
             distance, _ = body.query(frame.points[part.picked[frame.index]])
-            return bool(distance.min() < SAME_GAP_M)
+            if distance.min() < SAME_GAP_M:
+                return True
     return False
 
 

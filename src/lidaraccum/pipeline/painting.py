@@ -75,6 +75,7 @@ class Canvas:
             instance=self._instance,
             confidence=self._confidence,
             world_from_object=self._poses,
+            poses_at_stamp=True,
         )
 
     def _low_beside(self, picked: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -99,20 +100,21 @@ def paint_mover(track: Track, frame: SightedFrame, canvas: Canvas, box_growth: f
         return
     seconds = frame.stamp - track.last_stamp
     ahead = rigid.translation(track.velocity * seconds) @ track.world_from_object
-    gone_on = canvas.free(_near_shape(track.shape, ahead, frame))
-    stayed = canvas.free(_near_shape(track.shape, track.world_from_object, frame))
-    label, near, pose = STILL, stayed, track.world_from_object
+    still = np.zeros(3)
+    gone_on = canvas.free(_near_shape(track.shape, ahead, frame, track.velocity))
+    stayed = canvas.free(_near_shape(track.shape, track.world_from_object, frame, still))
+    label, near, pose, velocity = STILL, stayed, track.world_from_object, still
     if len(gone_on) > len(stayed):
-        label, near, pose = MOVING, gone_on, ahead
+        label, near, pose, velocity = MOVING, gone_on, ahead, track.velocity
     if len(near) > FOUND_SHARE * track.points:
-        _settle(track, frame, near, pose)
+        _settle(track, frame, near, pose, velocity)
         canvas.paint(track, near, label)
 
 
 def _follow(track: Track, frame: SightedFrame, picked: NDArray[np.int64]) -> None:
     """Place a mover in a frame: predicted from the last, then fitted to its shape."""
-    world = frame.world(picked)
     velocity = track.velocities[frame.index]
+    world = frame.world_at_stamp(picked, velocity)
     if track.shape is None:
         pose = rigid.translation(world.mean(axis=0))
         heading = float(np.arctan2(velocity[1], velocity[0]))
@@ -132,10 +134,16 @@ def _follow(track: Track, frame: SightedFrame, picked: NDArray[np.int64]) -> Non
     _note(track, frame, pose, len(picked))
 
 
-def _settle(track: Track, frame: SightedFrame, picked: NDArray[np.int64], pose: rigid.Pose) -> None:
+def _settle(
+    track: Track,
+    frame: SightedFrame,
+    picked: NDArray[np.int64],
+    pose: rigid.Pose,
+    velocity: NDArray[np.float64],
+) -> None:
     """Place a mover that no window saw in a frame, by its shape alone."""
     assert track.shape is not None
-    own = rigid.transform(rigid.invert(pose), frame.world(picked))
+    own = rigid.transform(rigid.invert(pose), frame.world_at_stamp(picked, velocity))
     pose = pose @ rigid.invert(track.shape.fit(own).correction)
     _note(track, frame, pose, len(picked))
 
@@ -152,12 +160,15 @@ def _in_box(track: Track, frame: SightedFrame, growth: float) -> NDArray[np.int6
     None at all when they would outnumber those known to be its own: then the box is wrong.
     """
     assert track.shape is not None
-    object_from_sensor = rigid.invert(track.world_from_object) @ frame.world_from_sensor
-    inside = track.shape.holds(rigid.transform(object_from_sensor, frame.points))
+    world = frame.world_at_stamp(np.arange(len(frame.rows)), track.velocities[frame.index])
+    inside = track.shape.holds(rigid.transform(rigid.invert(track.world_from_object), world))
     return np.flatnonzero(inside) if inside.sum() < growth * track.points else _NONE
 
 
-def _near_shape(shape: ObjectShape, pose: rigid.Pose, frame: SightedFrame) -> NDArray[np.int64]:
-    """The frame's obstacles (K,) on a shape at a pose."""
-    own = rigid.transform(rigid.invert(pose) @ frame.world_from_sensor, frame.points)
+def _near_shape(
+    shape: ObjectShape, pose: rigid.Pose, frame: SightedFrame, velocity: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """The frame's obstacles (K,) on a shape at a pose, if it moves so."""
+    world = frame.world_at_stamp(np.arange(len(frame.rows)), velocity)
+    own = rigid.transform(rigid.invert(pose), world)
     return np.flatnonzero(np.isfinite(shape.distances(own, FOUND_M)))

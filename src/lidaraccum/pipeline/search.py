@@ -68,7 +68,7 @@ def find_objects(
             movers = (
                 _settle([_meant(found, lead, frames)], movers, frames, 1.0) if found else movers
             )
-    return join_parts(movers, frames)
+    return join_parts(movers, frames, settings)
 
 
 def _accused(

@@ -23,6 +23,9 @@ ACROSS_M = 0.03
 ALONG_M = 0.6
 """A point is this sure to lie on the surface near it, and this sure of its place along it."""
 
+EDGE_SPREADS = 1.5
+"""A point farther from its neighbours' centre than so many times their spread is off their edge."""
+
 ROBUST_M = 0.1
 PRIOR = np.array([0.1, 0.1, 0.1, 0.05])
 """How far a prediction may be out: metres in x, y and z, radians about the upright axis."""
@@ -129,19 +132,28 @@ class ObjectShape:
         self, points: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Way (N, 3) from each point to the shape near it, NaN without, and its certainty."""
-        centre, normal, flatness, near = self._planes(points)
+        centre, normal, flatness, spread, near = self._planes(points)
         lag = centre - points
         across = np.einsum("ni,ni->n", lag, normal)
         trust = near / (1.0 + (across / ROBUST_M) ** 2) ** 2
         outer = normal[:, :, None] * normal[:, None, :]
-        information = outer * (flatness / ACROSS_M**2)[:, None, None] + np.eye(3) / ALONG_M**2
+        # Off the edge of what was seen so far there is more of the surface, not a lag along it.
+        beside = np.linalg.norm(lag - across[:, None] * normal, axis=1) < EDGE_SPREADS * spread
+        information = outer * (flatness / ACROSS_M**2)[:, None, None]
+        information = information + np.eye(3) * (beside / ALONG_M**2)[:, None, None]
         lag[~near] = np.nan
         return lag, information * trust[:, None, None]
 
     def _planes(
         self, points: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-        """Planes at points (N, 3): centres and normals (N, 3), flatness 0..1 and nearness (N,)."""
+    ) -> tuple[
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.bool_],
+    ]:
+        """Planes at points (N, 3): centres, normals (N, 3); flatness, spread m, nearness (N,)."""
         count = min(NEIGHBOURS, len(self._points))
         distance, rows = self._tree.query(points, k=count)
         distance, rows = distance.reshape(len(points), count), rows.reshape(len(points), count)
@@ -153,10 +165,11 @@ class ObjectShape:
         least, middle, most = variances.T
         # Neighbours on one line, as those of one beam are, tell no normal.
         flatness = np.clip(2 * (middle - least) / np.maximum(most, 1e-9), 0, 1)
-        return centre, normals, flatness, distance[:, 0] < REACH_M
+        spread_m = np.sqrt(variances.sum(axis=1))
+        return centre, normals, flatness, spread_m, distance[:, 0] < REACH_M
 
     def _residual(self, points: NDArray[np.float64]) -> float:
-        centre, normal, _, near = self._planes(points)
+        centre, normal, _, _, near = self._planes(points)
         across = np.abs(np.einsum("ni,ni->n", centre - points, normal))
         return float(np.median(np.where(near, across, REACH_M)))
 

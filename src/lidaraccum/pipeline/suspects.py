@@ -98,12 +98,14 @@ class Template:
         world: (P, 3) metres, world, at ``stamp``.
         heights: (P,) metres above the ground.
         stamp: Seconds.
+        seconds: (P,) after the stamp, when each was met.
         pivot: (3,) metres, world: the centre of the cluster, about which it turns.
     """
 
     world: NDArray[np.float64]
     heights: NDArray[np.float64]
     stamp: float
+    seconds: NDArray[np.float64]
     pivot: NDArray[np.float64]
 
 
@@ -114,4 +116,6 @@ def make_template(frame: SightedFrame, picked: NDArray[np.int64], count: int) ->
         kept = kept[np.linspace(0, len(kept) - 1, count).astype(np.int64)]
     chosen = picked[kept]
     centre = frame.world(picked).mean(axis=0)
-    return Template(frame.world(chosen), frame.heights[chosen], frame.stamp, centre)
+    return Template(
+        frame.world(chosen), frame.heights[chosen], frame.stamp, frame.seconds[chosen], centre
+    )

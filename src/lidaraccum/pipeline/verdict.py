@@ -21,6 +21,11 @@ more where the frame saw through its place."""
 
 REFINING_STEPS = 3
 
+SLIDES = 8
+WORTH_SLIDING = 0.01
+"""So many faster and slower velocities are tried, a gate's width apart at the window's end; one is
+taken that costs so much less. The long side of a truck finds partners wherever it slides to."""
+
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
@@ -70,7 +75,7 @@ def judge_points(
         for row in np.flatnonzero(turns):
             motion = course(template.pivot, velocities[row], float(turns[row]), seconds)
             moved[row] = rigid.transform(motion, template.world)
-        local = rigid.transform(frame.sensor_from_world, moved.reshape(-1, 3))
+        local = as_met(moved, velocities[:, None], template.seconds, frame).reshape(-1, 3)
         gate = settings.truncation_m
         distance, _ = frame.tree.query(frame.places(local, heights), distance_upper_bound=gate)
         through = np.isinf(distance)
@@ -80,6 +85,56 @@ def judge_points(
         costs.append(cost.reshape(hypotheses, count))
         passed.append(through.reshape(hypotheses, count))
     return np.mean(costs, axis=0), np.mean(passed, axis=0)
+
+
+def slide_velocity(
+    template: Template,
+    velocity: NDArray[np.float64],
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+    turn: float = 0.0,
+) -> NDArray[np.float64]:
+    """The velocity (3,) of the same course that costs least: what `refine_velocity` is blind to."""
+    span = max(abs(frame.stamp - template.stamp) for frame in frames)
+    speed = float(np.linalg.norm(velocity))
+    if speed == 0 or span == 0:
+        return velocity
+    step = velocity / speed * (settings.truncation_m / span)
+    tried = velocity + np.arange(-SLIDES, SLIDES + 1)[:, None] * step
+    cost = judge(template, tried, frames, settings, np.full(len(tried), turn)).cost
+    best = int(cost.argmin())
+    if cost[SLIDES] - cost[best] < WORTH_SLIDING:
+        return velocity
+    if 0 < best < len(tried) - 1:  # the vertex of the parabola through the three
+        before, least, after = cost[best - 1 : best + 2]
+        bend = before - 2 * least + after
+        if bend > 0:
+            return np.asarray(tried[best] + 0.5 * (before - after) / bend * step)
+    return np.asarray(tried[best])
+
+
+def as_met(
+    moved: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    seconds: NDArray[np.float64],
+    frame: SightedFrame,
+) -> NDArray[np.float64]:
+    """Where a frame meets points of a mover: a sweep takes time, and the mover goes on meanwhile.
+
+    Args:
+        moved: (..., N, 3) metres, world: the points, moved from stamp to stamp.
+        velocity: (..., 1, 3) or (3,) m/s, world.
+        seconds: (N,) after its own frame's stamp, when each was met.
+        frame: Who meets them.
+
+    Returns:
+        (..., N, 3) metres, sensor coordinates.
+    """
+    local = rigid.transform(frame.sensor_from_world, moved.reshape(-1, 3)).reshape(moved.shape)
+    if not frame.is_timed:
+        return local
+    later = frame.seconds_at(local.reshape(-1, 3)).reshape(moved.shape[:-1]) - seconds
+    return np.asarray(local + later[..., None] * (velocity @ frame.sensor_from_world[:3, :3].T))
 
 
 def refine_velocity(
@@ -105,7 +160,7 @@ def refine_velocity(
             if turn:
                 motion = course(template.pivot, refined, turn, seconds)
                 moved = rigid.transform(motion, template.world)
-            local = rigid.transform(frame.sensor_from_world, moved)
+            local = as_met(moved, refined, template.seconds, frame)
             distance, partner = frame.tree.query(
                 frame.places(local, template.heights),
                 distance_upper_bound=2 * settings.truncation_m,
