@@ -16,6 +16,7 @@ import pytest
 def start(folder: Path, out: Path, *more: object) -> subprocess.Popen[str]:
     """Start accumulate in a process of its own and wait until it is writing."""
     command = [sys.executable, "-m", "lidaraccum", "accumulate", folder, "-o", out, *more]
+    command.append("--no-network")  # killed while it writes, not while it thinks
     process = subprocess.Popen(
         [str(part) for part in command], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )

@@ -74,6 +74,17 @@ def test_a_compensated_sweep_is_not_bent(world: Any, rolling: Any, times: bool) 
         np.testing.assert_array_equal(seconds, frames[2].time_offset)
 
 
+@pytest.mark.parametrize("measured", [True, False], ids=["measured", "compensated"])
+def test_times_are_heeded_in_a_vehicle_s_coordinates_too(
+    world: Any, rolling: Any, measured: bool
+) -> None:
+    """Seen from elsewhere than the sensor's place, equal steps of azimuth are not equal."""
+    frames = rolling.frames if measured else world.compensated(rolling, TWIST, times=True)
+    arm = np.array([1.4, 0.3, 1.8], dtype=np.float32)
+    elsewhere = [frame.with_points(frame.points + arm) for frame in frames]
+    assert all(frame.deskewed == measured for frame in register(elsewhere))
+
+
 def test_a_sweep_at_one_time_is_not_bent(straight: Any) -> None:
     assert not any(frame.deskewed for frame in register(straight.frames[:6]))
 

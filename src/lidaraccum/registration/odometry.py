@@ -38,6 +38,9 @@ MAX_OPENING_PASSES = 3
 SETTLED_M, SETTLED_RAD = 0.02, 0.001
 """The first frames are solved again as long as the first motion changes by more."""
 
+CLEARLY_BETTER = 0.96
+"""Of two clocks one leaves less than this share of the other's distances to the map."""
+
 LATE_CLOCK = (
     "motion within the sweep is undone from here on, which may move the pose by a part of it"
 )
@@ -148,6 +151,32 @@ class Odometry:
         clock = self._look_at_sweep() or first_clock
         if clock == first_clock == Compensated():
             return passed if self._is_steady(passed) else self._tried_again(opening, passed)
+        if clock != first_clock and has_times:
+            return self._better(opening, passed, first_clock, clock)
+        return self._settled(opening, passed, clock)
+
+    def _better(
+        self,
+        opening: list[Indexed],
+        passed: list[RegisteredFrame],
+        timed: SweepClock,
+        seeming: SweepClock,
+    ) -> list[RegisteredFrame]:
+        """The first frames by the file's times where these fit clearly better than what seems so.
+
+        Equal steps of azimuth are seen from the sensor's place only: points in a vehicle's
+        coordinates look as if compensated.
+        """
+        by_times = self._settled(opening, passed, timed)
+        without = self._settled(opening, passed, seeming)
+        if _mean_residual(by_times) > CLEARLY_BETTER * _mean_residual(without):
+            return without
+        return self._run(opening, timed, self._opening_twist(by_times))
+
+    def _settled(
+        self, opening: list[Indexed], passed: list[RegisteredFrame], clock: SweepClock
+    ) -> list[RegisteredFrame]:
+        """The first frames again and again, from the motion before, until it stays."""
         for _ in range(MAX_OPENING_PASSES):
             twist = self._opening_twist(passed)
             passed = self._run(opening, clock, twist)
@@ -260,6 +289,11 @@ def _steps_between(
         between = rigid.invert(one.world_from_sensor) @ two.world_from_sensor
         twists.append(rigid.logarithm(between) / pace.steps(earlier, later))
     return np.stack(twists)
+
+
+def _mean_residual(registered: list[RegisteredFrame]) -> float:
+    """Of all frames but the first, which has nothing to lie on."""
+    return float(np.mean([one.quality.residual_m for one in registered[1:]]))
 
 
 def _mean_overlap(registered: list[RegisteredFrame]) -> float:
