@@ -38,6 +38,8 @@ WHOLE_GROWTH = 2.5
 they are more than this share, unless it has so many times the points."""
 
 GATHERINGS = 3
+MOST_GROWTH = 8.0
+"""What has so many times the points at one distance is something else: a wall that was touched."""
 
 STANDING_SHARE = 0.1
 STANDING_MARGIN = 0.1
@@ -229,9 +231,14 @@ def _lain_on(
             moved = rigid.transform(course(world.mean(axis=0), velocity, turn, seconds), world)
         local = as_met(moved, velocity, own.seconds[picked], frame)
         found = _points_at(frame, frame.places(local, heights), whole_only=whole_only)
-        if len(found):
+        nearer = max(1.0, _mean_range(own.points[picked]) / max(_mean_range(local), 0.1))
+        if 0 < len(found) < MOST_GROWTH * len(picked) * nearer**2:
             gathered[frame.index] = found
     return gathered
+
+
+def _mean_range(points: NDArray[np.float64]) -> float:
+    return float(np.linalg.norm(points, axis=1).mean())
 
 
 def _points_at(

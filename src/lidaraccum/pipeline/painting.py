@@ -20,8 +20,9 @@ LOW_REACH_M = 0.2
 LOST_FRAMES = 3
 FOUND_M = 0.25
 FOUND_SHARE = 0.5
+FOUND_GROWTH = 4.0
 """A mover that no window saw is looked for where it should be, in so many frames; there it is when
-so many points, against its last, lie this near to its shape."""
+so many points, against its last, and not many times more, lie this near to its shape."""
 
 
 _NONE = np.zeros(0, dtype=np.int64)
@@ -106,7 +107,7 @@ def paint_mover(track: Track, frame: SightedFrame, canvas: Canvas, box_growth: f
     label, near, pose, velocity = STILL, stayed, track.world_from_object, still
     if len(gone_on) > len(stayed):
         label, near, pose, velocity = MOVING, gone_on, ahead, track.velocity
-    if len(near) > FOUND_SHARE * track.points:
+    if FOUND_SHARE * track.points < len(near) < FOUND_GROWTH * track.points:
         _settle(track, frame, near, pose, velocity)
         canvas.paint(track, near, label)
 
