@@ -1,4 +1,4 @@
-"""Times the network's stages on simulated frames. Usage: time_network.py [THREADS]."""
+"""Times the shipped network's stages on simulated frames. Usage: time_network.py [THREADS]."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from typing import TypeVar
 import torch
 
 from lidaraccum.model.batch import prepare, to_tensors
+from lidaraccum.model.checkpoint import load_network
 from lidaraccum.model.motion import Windows
-from lidaraccum.model.network import build_network, presence_map
+from lidaraccum.model.network import presence_map, some_close_points
 from lidaraccum.model.precision import has_bfloat16, inference
+from lidaraccum.model.weights import chosen_weights
 from lidaraccum.simulation.drive import simulate
 from lidaraccum.simulation.settings import DriveSettings
 
@@ -33,15 +35,13 @@ def timed(name: str, call: Callable[[], Answer], repeats: int = 5) -> Answer:
 def main() -> None:
     """A five-frame window of an HDL-64E on the 64 m grid."""
     torch.set_num_threads(int(sys.argv[1]) if len(sys.argv) > 1 else 2)
-    network = build_network().eval()
+    network = load_network(chosen_weights(None))
     sequence = simulate(DriveSettings(seed=2, sensor="HDL-64E", rate_hz=10.0))
     frames = [sequence[index] for index in range(5)]
     print(f"bfloat16: {has_bfloat16('cpu')}; points: {[len(frame) for frame in frames]}")
     prepared = timed("prepare (numpy)", lambda: [prepare(f, network.settings) for f in frames])
     tensors = timed("to tensors", lambda: to_tensors(prepared))
     windows, poses = Windows.single(5), torch.eye(4).expand(5, 4, 4)
-    # Fresh weights find no foreground: a sixth of the points stands for what trained ones find.
-    points = torch.arange(0, len(tensors.points), 6)
     with torch.no_grad(), inference():
         maps = timed("of encode: pillars", lambda: network.pillars(tensors))
         timed("of encode: backbone", lambda: network.backbone(maps))
@@ -53,6 +53,7 @@ def main() -> None:
                 features.base, presence_map(features), poses, windows, tensors.stamps, 32.0
             ),
         )
+        points = some_close_points(features)
         seen = timed("perceive", lambda: network.perceive(features, poses, windows, points))
         ids = torch.arange(len(points)) % 30
         timed("track (29 objects)", lambda: network.track(seen, ids))
