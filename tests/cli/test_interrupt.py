@@ -18,7 +18,12 @@ def start(folder: Path, out: Path, *more: object) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "lidaraccum", "accumulate", folder, "-o", out, *more]
     command.append("--no-network")  # killed while it writes, not while it thinks
     process = subprocess.Popen(
-        [str(part) for part in command], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        [str(part) for part in command],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        # Under a shell's background job the interrupt would be ignored from the start.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     deadline = time.monotonic() + 60
     while time.monotonic() < deadline and process.poll() is None:
