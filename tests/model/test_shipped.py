@@ -37,7 +37,7 @@ def test_every_file_beside_them_can_be_read_too(shipped: Path) -> None:
         assert all(bool(np.isfinite(p.detach().numpy()).all()) for p in network.parameters())
 
 
-def test_on_streets_they_never_saw_they_find_more_than_geometry(run: Any, tmp_path: Path) -> None:
+def test_on_streets_they_never_saw_they_find_more_than_geometry(run: Any) -> None:
     """Two windows of the test set: what can move, and no less of what does."""
     methods = ("--method", "network", "--method", "cluster-icp")
     result = run("evaluate", "--simulated", 2, *methods, "--json")

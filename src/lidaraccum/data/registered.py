@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from lidaraccum.data.frame import Frame
 
+LONGEST_SWEEP_S = 0.25
+"""A time per point that reaches farther from the stamp is no time within one sweep."""
+
 
 @dataclass(frozen=True)
 class RegistrationQuality:
@@ -49,3 +52,11 @@ class RegisteredFrame:
     quality: RegistrationQuality
     deskewed: bool = False
     seconds_from_stamp: NDArray[np.float32] | None = None
+
+    @property
+    def seconds_within_sweep(self) -> NDArray[np.float64] | None:
+        """(N,) `seconds_from_stamp`; None where nothing tells, or nothing that a sweep can take."""
+        seconds = self.seconds_from_stamp
+        if seconds is None or not np.abs(seconds).max(initial=0.0) <= LONGEST_SWEEP_S:
+            return None
+        return seconds.astype(np.float64)

@@ -100,17 +100,22 @@ def _under_the_road(level: NDArray[Any], mount_m: float) -> NDArray[np.bool_]:
 
 def _look_up(low: NDArray[np.float64], xy: NDArray[Any]) -> NDArray[np.float64]:
     """What a map (G, G) says at places (N, 2), metres; NaN beyond its edge."""
+    inside, key = _keys(xy)
+    found = np.full(len(xy), np.nan)
+    found[inside] = low.ravel()[key]
+    return found
+
+
+def _keys(xy: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Which of places (N, 2) are on the map (K,), and their cells in the flat map (K,)."""
     cells = np.floor((xy + REACH_M) / CELL_M).astype(np.int64)
-    inside = np.asarray(((cells >= 0) & (cells < _CELLS)).all(axis=1))
-    cells[~inside] = 0
-    return np.asarray(np.where(inside, low[cells[:, 0], cells[:, 1]], np.nan), dtype=np.float64)
+    inside = np.flatnonzero(((cells >= 0) & (cells < _CELLS)).all(axis=1))
+    return inside, cells[inside, 0] * _CELLS + cells[inside, 1]
 
 
 def _lowest(xy: NDArray[Any], z: NDArray[Any]) -> NDArray[np.float64]:
     """Lowest z (G, G) in each cell; NaN where there is no point."""
-    cells = np.floor((xy + REACH_M) / CELL_M).astype(np.int64)
-    inside = np.flatnonzero(((cells >= 0) & (cells < _CELLS)).all(axis=1))
-    key = cells[inside, 0] * _CELLS + cells[inside, 1]
+    inside, key = _keys(xy)
     low = np.full(_CELLS * _CELLS, np.inf)
     np.minimum.at(low, key, z[inside].astype(np.float64))
     low[~np.isfinite(low)] = np.nan

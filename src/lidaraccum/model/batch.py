@@ -141,6 +141,11 @@ class FrameTensors:
         """(V,) int64 frame of each pillar."""
         return _repeat(self.pillar_counts, self.points.device)
 
+    @property
+    def pillar_place(self) -> torch.Tensor:
+        """(V,) int64 cell of each pillar, counted through the grids of all frames in order."""
+        return self.pillar_frame * self.cells * self.cells + self.pillar_cell
+
     def pillar_centres(self) -> torch.Tensor:
         """(V, 2) x and y of the pillars' centres, metres, level coordinates."""
         index = torch.stack([self.pillar_cell // self.cells, self.pillar_cell % self.cells], dim=1)

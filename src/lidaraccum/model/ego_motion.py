@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import TypeVar
 
 import torch
 from torch import nn
@@ -26,8 +27,26 @@ STANDING_ODDS = 16.0
 height, but there is far more of it."""
 
 
+_Kind = TypeVar("_Kind", bound="_Rows")
+
+
 @dataclass(frozen=True, eq=False)
-class EgoPillars:
+class _Rows:
+    """Tensors, each with a row for every item."""
+
+    def pick(self: _Kind, index: torch.Tensor) -> _Kind:
+        """Items (K,) int64, in that order."""
+        return type(self)(*(getattr(self, item.name)[index] for item in fields(self)))
+
+    @classmethod
+    def stack(cls: type[_Kind], parts: Sequence[_Kind]) -> _Kind:
+        """Several put one after another."""
+        columns = ([getattr(part, item.name) for part in parts] for item in fields(cls))
+        return cls(*map(torch.cat, columns))
+
+
+@dataclass(frozen=True, eq=False)
+class EgoPillars(_Rows):
     """The N background pillars that speak for each of F frames.
 
     Attributes:
@@ -42,28 +61,9 @@ class EgoPillars:
     valid: torch.Tensor
     level_from_sensor: torch.Tensor
 
-    def pick(self, index: torch.Tensor) -> EgoPillars:
-        """Frames (K,) int64, in that order."""
-        return EgoPillars(
-            self.position[index],
-            self.feature[index],
-            self.valid[index],
-            self.level_from_sensor[index],
-        )
-
-    @staticmethod
-    def stack(parts: list[EgoPillars]) -> EgoPillars:
-        """Several put one after another."""
-        return EgoPillars(
-            torch.cat([part.position for part in parts]),
-            torch.cat([part.feature for part in parts]),
-            torch.cat([part.valid for part in parts]),
-            torch.cat([part.level_from_sensor for part in parts]),
-        )
-
 
 @dataclass(frozen=True, eq=False)
-class EgoMatch:
+class EgoMatch(_Rows):
     """Proposed motions between B pairs of frames.
 
     Attributes:
@@ -74,8 +74,8 @@ class EgoMatch:
         column_mass: (B, N) 0..1, of target pillars.
         source_valid: (B, N) bool.
         target_valid: (B, N) bool.
-        rounds: The motion between level coordinates after each round of matching, the last one's
-            being the answer; first the motion begun with, where one was given.
+        rounds: (B, R, 4, 4) the motion between level coordinates after each round of matching, the
+            last one's being the answer; first the motion begun with, where one was given.
     """
 
     target_from_source: torch.Tensor
@@ -85,36 +85,7 @@ class EgoMatch:
     column_mass: torch.Tensor
     source_valid: torch.Tensor
     target_valid: torch.Tensor
-    rounds: tuple[torch.Tensor, ...]
-
-    def pick(self, index: torch.Tensor) -> EgoMatch:
-        """Pairs (K,) int64, in that order."""
-        return EgoMatch(
-            self.target_from_source[index],
-            self.level_target_from_source[index],
-            self.source[index],
-            self.row_mass[index],
-            self.column_mass[index],
-            self.source_valid[index],
-            self.target_valid[index],
-            tuple(motion[index] for motion in self.rounds),
-        )
-
-    @staticmethod
-    def stack(parts: Sequence[EgoMatch]) -> EgoMatch:
-        """Several put one after another."""
-        return EgoMatch(
-            torch.cat([part.target_from_source for part in parts]),
-            torch.cat([part.level_target_from_source for part in parts]),
-            torch.cat([part.source for part in parts]),
-            torch.cat([part.row_mass for part in parts]),
-            torch.cat([part.column_mass for part in parts]),
-            torch.cat([part.source_valid for part in parts]),
-            torch.cat([part.target_valid for part in parts]),
-            tuple(
-                torch.cat(motions) for motions in zip(*(part.rounds for part in parts), strict=True)
-            ),
-        )
+    rounds: torch.Tensor
 
 
 class EgoHead(nn.Module):
@@ -254,7 +225,7 @@ class Matcher(nn.Module):
             column_mass=column_mass,
             source_valid=source.valid,
             target_valid=target.valid,
-            rounds=tuple(rounds),
+            rounds=torch.stack(rounds, dim=1),
         )
 
     def _fit(

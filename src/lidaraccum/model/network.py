@@ -153,8 +153,7 @@ class Network(nn.Module):
         """
         base = self.backbone(self.pillars(frames))
         scores = self.foreground_head(base).float()[:, 0].reshape(-1)
-        area = frames.cells * frames.cells
-        foreground = scores.index_select(0, frames.pillar_frame * area + frames.pillar_cell)
+        foreground = scores.index_select(0, frames.pillar_place)
         index, valid = choose_background(
             frames, foreground.detach(), self.settings.ego_pillars, choice
         )
@@ -177,6 +176,7 @@ class Network(nn.Module):
         """
         device = features.base.device
         stamps = features.frames.stamps
+        gaps = torch.tensor(windows.gaps(stamps), device=device).float()
         known = torch.eye(4, device=device).repeat(len(features), 1, 1)
         matches: list[EgoMatch] = []
         order: list[int] = []
@@ -184,11 +184,10 @@ class Network(nn.Module):
             targets = [windows.target_of_frame[frame] for frame in sources]
             rows = torch.tensor([sources, targets], dtype=torch.int64, device=device)
             source, target = rows
-            gaps = [stamps[i] - stamps[t] for i, t in zip(sources, targets, strict=True)]
             match = self.matcher(
                 features.ego.pick(source),
                 features.ego.pick(target),
-                torch.tensor(gaps, device=device).float(),
+                gaps[source],
                 steady(known, stamps, sources, windows) if matches else None,
             )
             known = known.index_copy(0, source, match.level_target_from_source.detach())
@@ -288,11 +287,9 @@ class Network(nn.Module):
 def presence_map(features: FrameFeatures) -> torch.Tensor:
     """(F, 1, S, S) probability of foreground in occupied pillars, 0 elsewhere; no gradient."""
     frames = features.frames
-    area = frames.cells * frames.cells
-    flat = features.foreground.new_zeros(len(frames) * area)
-    places = frames.pillar_frame * area + frames.pillar_cell
-    flat = flat.index_copy(0, places, features.foreground.detach().sigmoid())
-    return flat.view(len(frames), 1, frames.cells, frames.cells)
+    maps = features.foreground.new_zeros(len(frames), 1, frames.cells, frames.cells)
+    chance = features.foreground.detach().sigmoid()
+    return maps.view(-1).index_copy(0, frames.pillar_place, chance).view_as(maps)
 
 
 def close_points(features: FrameFeatures) -> torch.Tensor:

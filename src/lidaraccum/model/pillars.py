@@ -34,9 +34,8 @@ class PillarEncoder(nn.Module):
         hidden = torch.relu(self.outer(hidden))  # (P, C')
         pooled = tallest(hidden, frames.pillar, len(frames.pillar_cell))
         pillars = self.project(self.normalise(pooled).to(hidden.dtype))  # (V, C)
-        area = frames.cells * frames.cells
-        canvas = pillars.new_zeros(len(frames) * area, pillars.shape[1])
-        canvas = canvas.index_copy(0, frames.pillar_frame * area + frames.pillar_cell, pillars)
+        canvas = pillars.new_zeros(len(frames) * frames.cells * frames.cells, pillars.shape[1])
+        canvas = canvas.index_copy(0, frames.pillar_place, pillars)
         rows = canvas.view(len(frames), frames.cells, frames.cells, -1)
         return rows.permute(0, 3, 1, 2)  # (F, C, S, S), channels last in memory
 

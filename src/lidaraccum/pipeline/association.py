@@ -9,11 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.geometry import rigid
-from lidaraccum.pipeline.courses import turned
+from lidaraccum.pipeline.courses import are_alike, turned
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.object_ids import ObjectIds
-from lidaraccum.pipeline.objects import Expectation, WindowObject
+from lidaraccum.pipeline.objects import (
+    LIKE_SPEED_MPS,
+    LIKE_SPEED_SHARE,
+    Expectation,
+    WindowObject,
+)
 from lidaraccum.pipeline.shape import ObjectShape
 
 OVERLAP = 0.3
@@ -25,9 +30,6 @@ REACH_S = 1.0
 
 FAR_M = 15.0
 """Centres farther apart are not looked at: no mover is so long."""
-
-LIKE_SPEED_MPS = 2.0
-LIKE_SPEED_SHARE = 0.3
 
 
 @dataclass
@@ -73,8 +75,7 @@ class Track:
 
     def agrees(self, velocity: NDArray[np.float64]) -> bool:
         """Whether a velocity (3,) can be this mover's in the next window."""
-        allowed = LIKE_SPEED_MPS + LIKE_SPEED_SHARE * float(np.linalg.norm(self.velocity))
-        return bool(np.linalg.norm(velocity - self.velocity) < allowed)
+        return are_alike(self.velocity, velocity, LIKE_SPEED_MPS, LIKE_SPEED_SHARE)
 
     def take(self, found: WindowObject, frames: Sequence[SightedFrame]) -> None:
         """Go on with what the latest window says."""

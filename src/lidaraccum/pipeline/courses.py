@@ -30,6 +30,27 @@ def way(velocity: NDArray[np.float64], turn: float, seconds: float) -> NDArray[n
     return turned(velocity, half) * (seconds * float(np.sinc(half / np.pi)))
 
 
+def are_alike(
+    one: NDArray[np.float64], other: NDArray[np.float64], speed_mps: float, share: float
+) -> bool:
+    """Whether velocities (3,) differ by less than a speed and a share of the first one's."""
+    allowed = speed_mps + share * float(np.linalg.norm(one))
+    return bool(np.linalg.norm(other - one) < allowed)
+
+
+def carried(
+    points: NDArray[np.float64],
+    pivot: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    turn: float,
+    seconds: float,
+) -> NDArray[np.float64]:
+    """Points (N, 3) of a thing, world, so many seconds on its `course` later."""
+    if turn == 0:
+        return points + velocity * seconds
+    return rigid.transform(course(pivot, velocity, turn, seconds), points)
+
+
 def course(
     pivot: NDArray[np.float64], velocity: NDArray[np.float64], turn: float, seconds: float
 ) -> rigid.Pose:

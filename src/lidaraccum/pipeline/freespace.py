@@ -24,9 +24,6 @@ no more than this: the next frame's beams hit the same wall at other heights."""
 FARTHEST_ECHO_M = 1_000.0
 """Farther points are damage, not echoes."""
 
-LONGEST_SWEEP_S = 0.25
-"""A time per point that reaches farther from the stamp is no time within one sweep."""
-
 AZIMUTH_BINS = 360
 
 LOW_SHARE = 0.4
@@ -70,7 +67,8 @@ class SightedFrame:
         near = np.concatenate([self.rows, self.low_rows])
         self.near_points = points[near].astype(np.float64)
         self.near_heights = heights[near]
-        self.seconds = _seconds_within_sweep(registered)[self.rows]
+        seconds = registered.seconds_within_sweep
+        self.seconds = np.zeros(len(self.rows)) if seconds is None else seconds[self.rows]
         self.segments = connected_cells(self.points, settings.cell_m)
         self.segment_sizes = np.bincount(self.segments)
         self.through = np.zeros(len(self.rows), dtype=np.int16)
@@ -158,10 +156,10 @@ class SightedFrame:
         full = np.flatnonzero(counts)
         about = np.concatenate([full - AZIMUTH_BINS, full, full + AZIMUTH_BINS])
         means = np.tile(sums[full] / counts[full], 3)
-        after = np.searchsorted(about, np.arange(AZIMUTH_BINS))
+        wanted = np.arange(AZIMUTH_BINS)
+        after = np.searchsorted(about, wanted)
         before = after - 1
-        bin_ = np.arange(AZIMUTH_BINS)
-        nearest = np.where(about[after] - bin_ < bin_ - about[before], after, before)
+        nearest = np.where(about[after] - wanted < wanted - about[before], after, before)
         return np.asarray(means[nearest])
 
     def world_of_near(self) -> NDArray[np.float64]:
@@ -174,14 +172,6 @@ class SightedFrame:
         sighting = self.view.look(rigid.transform(sensor_from_other, other.points))
         other.through += sighting.through
         other.met += sighting.met
-
-
-def _seconds_within_sweep(registered: RegisteredFrame) -> NDArray[np.float64]:
-    """When after the stamp each of N points was met; 0 where nothing tells, or nothing credible."""
-    seconds = registered.seconds_from_stamp
-    if seconds is None or not np.abs(seconds).max(initial=0.0) <= LONGEST_SWEEP_S:
-        return np.zeros(len(registered.frame))
-    return seconds.astype(np.float64)
 
 
 def _azimuth_bins(points: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from lidaraccum.data.perceived import PerceivedFrame
 from lidaraccum.geometry import rigid
-from lidaraccum.pipeline.freespace import LONGEST_SWEEP_S
 from lidaraccum.registration.deskew import transform_along
 
 MAX_APART_S = 1.0
@@ -89,8 +88,8 @@ def _undone(
 ) -> PerceivedFrame:
     perceived, sightings = sighted
     registered = perceived.registered
-    seconds = registered.seconds_from_stamp
-    if seconds is None or not sightings or not np.abs(seconds).max(initial=0.0) <= LONGEST_SWEEP_S:
+    seconds = registered.seconds_within_sweep
+    if seconds is None or not sightings:
         return perceived
     points = registered.frame.points.copy()
     poses = dict(perceived.world_from_object)
@@ -102,7 +101,7 @@ def _undone(
         own = rigid.transform(object_from_sensor, points[now.rows])
         if np.linalg.norm(np.cross(rate[:3], own.mean(axis=0)) + rate[3:]) > max_speed_mps:
             continue
-        own = transform_along(-rate, seconds[now.rows].astype(np.float64), own)
+        own = transform_along(-rate, seconds[now.rows], own)
         points[now.rows] = rigid.transform(rigid.invert(object_from_sensor), own)
         poses[instance] = now.world_from_object @ rigid.exponential(-rate * now.lag_s)
     return replace(

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from lidaraccum.geometry import rigid
 from lidaraccum.geometry.clustering import connected_cells
 from lidaraccum.geometry.voxel import thin
-from lidaraccum.pipeline.courses import course, turned
+from lidaraccum.pipeline.courses import are_alike, carried, turned
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.suspects import Suspect, Template, make_template
@@ -191,9 +190,9 @@ def gather(
         if len(picked) == 0:
             break
         found = _lain_on(source, picked, there, frames, turn, whole_only=number > 0)
-        for index, picked in found.items():
+        for index, more in found.items():
             known = gathered.get(index)
-            gathered[index] = picked if known is None else np.union1d(known, picked)
+            gathered[index] = more if known is None else np.union1d(known, more)
         fullest = max(frames, key=lambda frame: len(gathered.get(frame.index, ())))
         if fullest is source:
             break
@@ -226,9 +225,7 @@ def _lain_on(
         if frame is own:
             continue
         seconds = frame.stamp - own.stamp
-        moved = world + velocity * seconds
-        if turn:
-            moved = rigid.transform(course(world.mean(axis=0), velocity, turn, seconds), world)
+        moved = carried(world, world.mean(axis=0), velocity, turn, seconds)
         local = as_met(moved, velocity, own.seconds[picked], frame)
         found = _points_at(frame, frame.places(local, heights), whole_only=whole_only)
         nearer = max(1.0, _mean_range(own.points[picked]) / max(_mean_range(local), 0.1))
@@ -315,11 +312,12 @@ def _united_if_one(
     frames: Sequence[SightedFrame],
     settings: MotionSettings,
 ) -> WindowObject | None:
-    apart = float(np.linalg.norm(part.velocity - whole.velocity))
-    speed = float(np.linalg.norm(whole.velocity))
-    if apart > LIKE_SPEED_MPS + LIKE_SPEED_SHARE * speed or not _touch(part, whole, frames):
+    velocities = whole.velocity, part.velocity
+    if not are_alike(*velocities, LIKE_SPEED_MPS, LIKE_SPEED_SHARE):
         return None
-    if apart < SAME_SPEED_MPS or _goes_with(part, whole, frames, settings):
+    if not _touch(part, whole, frames):
+        return None
+    if are_alike(*velocities, SAME_SPEED_MPS, 0.0) or _goes_with(part, whole, frames, settings):
         return _united(whole, part)
     return _united(part, whole) if _goes_with(whole, part, frames, settings) else None
 

@@ -144,7 +144,7 @@ def _settle(
 ) -> None:
     """Place a mover that no window saw in a frame, by its shape alone."""
     assert track.shape is not None
-    own = rigid.transform(rigid.invert(pose), frame.world_at_stamp(picked, velocity))
+    own = _own_places(pose, frame, picked, velocity)
     pose = pose @ rigid.invert(track.shape.fit(own).correction)
     _note(track, frame, pose, len(picked))
 
@@ -161,8 +161,9 @@ def _in_box(track: Track, frame: SightedFrame, growth: float) -> NDArray[np.int6
     None at all when they would outnumber those known to be its own: then the box is wrong.
     """
     assert track.shape is not None
-    world = frame.world_at_stamp(np.arange(len(frame.rows)), track.velocities[frame.index])
-    inside = track.shape.holds(rigid.transform(rigid.invert(track.world_from_object), world))
+    velocity = track.velocities[frame.index]
+    own = _own_places(track.world_from_object, frame, np.arange(len(frame.rows)), velocity)
+    inside = track.shape.holds(own)
     return np.flatnonzero(inside) if inside.sum() < growth * track.points else _NONE
 
 
@@ -170,6 +171,15 @@ def _near_shape(
     shape: ObjectShape, pose: rigid.Pose, frame: SightedFrame, velocity: NDArray[np.float64]
 ) -> NDArray[np.int64]:
     """The frame's obstacles (K,) on a shape at a pose, if it moves so."""
-    world = frame.world_at_stamp(np.arange(len(frame.rows)), velocity)
-    own = rigid.transform(rigid.invert(pose), world)
+    own = _own_places(pose, frame, np.arange(len(frame.rows)), velocity)
     return np.flatnonzero(np.isfinite(shape.distances(own, FOUND_M)))
+
+
+def _own_places(
+    pose: rigid.Pose,
+    frame: SightedFrame,
+    picked: NDArray[np.int64],
+    velocity: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Where obstacles (K,) lie in a thing's coordinates at the stamp, (K, 3), if it moves so."""
+    return rigid.transform(rigid.invert(pose), frame.world_at_stamp(picked, velocity))

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lidaraccum.pipeline.courses import are_alike
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.hypotheses import propose
 from lidaraccum.pipeline.motion_settings import SURE, MotionSettings
@@ -134,8 +135,7 @@ def _with_accused(
 
 
 def _moves_alike(one: WindowObject, other: WindowObject) -> bool:
-    allowed = ALIKE_MPS + ALIKE_SHARE * float(np.linalg.norm(one.velocity))
-    return bool(np.linalg.norm(one.velocity - other.velocity) < allowed)
+    return are_alike(one.velocity, other.velocity, ALIKE_MPS, ALIKE_SHARE)
 
 
 def _size(one: WindowObject) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.geometry import rigid
-from lidaraccum.pipeline.courses import course, turned
+from lidaraccum.pipeline.courses import carried, turned
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.suspects import Template
@@ -73,8 +73,8 @@ def judge_points(
             continue
         moved = template.world[None] + velocities[:, None] * seconds
         for row in np.flatnonzero(turns):
-            motion = course(template.pivot, velocities[row], float(turns[row]), seconds)
-            moved[row] = rigid.transform(motion, template.world)
+            turn = float(turns[row])
+            moved[row] = carried(template.world, template.pivot, velocities[row], turn, seconds)
         local = as_met(moved, velocities[:, None], template.seconds, frame).reshape(-1, 3)
         gate = settings.truncation_m
         distance, _ = frame.tree.query(frame.places(local, heights), distance_upper_bound=gate)
@@ -156,10 +156,7 @@ def refine_velocity(
             seconds = frame.stamp - template.stamp
             if seconds == 0:
                 continue
-            moved = template.world + refined * seconds
-            if turn:
-                motion = course(template.pivot, refined, turn, seconds)
-                moved = rigid.transform(motion, template.world)
+            moved = carried(template.world, template.pivot, refined, turn, seconds)
             local = as_met(moved, refined, template.seconds, frame)
             distance, partner = frame.tree.query(
                 frame.places(local, template.heights),

@@ -67,8 +67,8 @@ def ego_loss(match: EgoMatch, true_level: torch.Tensor) -> torch.Tensor:
         true_level: (B, 4, 4) true level_target_from_source.
     """
     true = move(true_level, match.source)
-    errors = [(move(motion, match.source) - true).abs().sum(dim=2) for motion in match.rounds]
-    distance = _mean(torch.stack(errors).mean(dim=0), match.source_valid)
+    errors = (move(match.rounds, match.source[:, None]) - true[:, None]).abs().sum(dim=3)
+    distance = _mean(errors.mean(dim=1), match.source_valid)
     outliers = torch.cat([1.0 - match.row_mass, 1.0 - match.column_mass], dim=1)
     valid = torch.cat([match.source_valid, match.target_valid], dim=1)
     return distance + INLIER_WEIGHT * _mean(outliers, valid)
