@@ -27,7 +27,7 @@ from lidaraccum.geometry import rigid
 from lidaraccum.io.sequences import open_sequence
 from lidaraccum.metrics.segmentation import SegmentationCounts, compare
 from lidaraccum.simulation.drive import simulate
-from lidaraccum.simulation.windows import TEST_WINDOWS, held_out_settings
+from lidaraccum.simulation.windows import held_out_numbers, held_out_settings
 
 VOXEL_M, HIT_INFLATION_M, UNKNOWN_INFLATION = 0.1, 0.2, 2
 
@@ -64,8 +64,8 @@ def sequences(source: str) -> Iterator[LabelledSequence]:
     if not (kind == "simulated" and colon):
         yield open_sequence(source)
         return
-    for number in range(int(count)):
-        yield simulate(held_out_settings(number * TEST_WINDOWS // int(count)))
+    for number in held_out_numbers(int(count)):
+        yield simulate(held_out_settings(number))
 
 
 def moving_points(window: Window, world_from_sensor: NDArray[np.float64]) -> list[BoolArray]:

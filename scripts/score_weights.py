@@ -27,7 +27,7 @@ from lidaraccum.metrics.segmentation import SegmentationCounts
 from lidaraccum.model.checkpoint import load_network
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.simulation.drive import simulate
-from lidaraccum.simulation.windows import TEST_WINDOWS, held_out_settings
+from lidaraccum.simulation.windows import held_out_numbers, held_out_settings
 from lidaraccum.training.end_to_end import EndToEnd
 from lidaraccum.training.scores import scores_of
 from lidaraccum.training.stages import StageScores, score_stages
@@ -43,9 +43,9 @@ STAGES = (
 
 
 def test_windows(count: int, extent_m: float, settings: NetworkSettings) -> Iterator[Batch]:
-    """Windows spread evenly over the test set."""
-    for number in range(count):
-        drawn = replace(held_out_settings(number * TEST_WINDOWS // count), compensated=True)
+    """So many windows of the test set, all sensors and speeds among them."""
+    for number in held_out_numbers(count):
+        drawn = replace(held_out_settings(number), compensated=True)
         drive = simulate(drawn)
         yield make_batch([window_of(drive, range(len(drive)), settings, extent_m)])
 

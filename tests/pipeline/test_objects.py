@@ -16,7 +16,13 @@ from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import BALANCED
 from lidaraccum.pipeline.search import find_objects
 from lidaraccum.pipeline.suspects import Template, make_template
-from lidaraccum.pipeline.verdict import as_met, judge, refine_velocity, slide_velocity
+from lidaraccum.pipeline.verdict import (
+    as_met,
+    bend_course,
+    judge,
+    refine_velocity,
+    slide_velocity,
+)
 
 CAR_VELOCITY = np.array([-8.0, 0.0, 0.0])
 
@@ -121,6 +127,15 @@ def test_a_turning_car_is_explained_by_its_turn(frames: list[SightedFrame]) -> N
         template, velocity + np.array([0.5, -0.4, 0.0]), turning, BALANCED, turn
     )
     np.testing.assert_allclose(refined, velocity, atol=0.2)
+    bent, found = bend_course(template, velocity + np.array([0.3, -0.3, 0.0]), turning, BALANCED)
+    assert abs(found - turn) < 0.3
+    assert judge(template, bent[None], turning, BALANCED, np.array([found])).cost[0] < 0.2
+
+
+def test_what_goes_straight_is_not_bent(frames: list[SightedFrame], car: Template) -> None:
+    velocity, turn = bend_course(car, CAR_VELOCITY, frames, BALANCED)
+    assert turn == 0
+    np.testing.assert_array_equal(velocity, CAR_VELOCITY)
 
 
 def test_a_truck_is_not_slid_along_its_own_side(look: Any, new_mover: Any) -> None:

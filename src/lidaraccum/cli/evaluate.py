@@ -44,7 +44,7 @@ class Lengths(click.ParamType):  # type: ignore[type-arg,unused-ignore]
     "--simulated",
     type=click.IntRange(1, 200),
     metavar="N",
-    help="Score N of the 200 windows of the simulated test set, spread over it.",
+    help="Score N of the 200 windows of the simulated test set, sensors in turn.",
 )
 @click.option("--still-shutter", is_flag=True, help="Simulate those without rolling shutter.")
 @click.option(
@@ -156,10 +156,10 @@ def _drives(params: dict[str, Any]) -> tuple[Iterable[LabelledSequence], int]:
 
 def _simulated(count: int, frames: int, *, still: bool) -> Iterator[LabelledSequence]:
     from lidaraccum.simulation.drive import simulate
-    from lidaraccum.simulation.windows import TEST_WINDOWS, held_out_settings
+    from lidaraccum.simulation.windows import held_out_numbers, held_out_settings
 
-    for number in range(count):
-        settings = held_out_settings(number * TEST_WINDOWS // count, frames)
+    for number in held_out_numbers(count):
+        settings = held_out_settings(number, frames)
         yield simulate(replace(settings, rolling_shutter=False) if still else settings)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from lidaraccum.data.accumulation import BACKGROUND, MOVING
 from lidaraccum.data.perceived import PerceivedFrame
 from lidaraccum.data.registered import RegisteredFrame
+from lidaraccum.geometry.viewpoint import find_viewpoint
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import BALANCED, MotionSettings
 
@@ -28,7 +29,9 @@ class SeenThrough:
 
     def perceive(self, frames: Iterable[RegisteredFrame]) -> Iterator[PerceivedFrame]:
         """All frames at once: every one looks at every other."""
-        sighted = [SightedFrame(registered, self._settings) for registered in frames]
+        windowed = list(frames)
+        viewpoint = find_viewpoint(windowed[0].frame.points) if windowed else None
+        sighted = [SightedFrame(registered, self._settings, viewpoint) for registered in windowed]
         for one, other in permutations(sighted, 2):
             one.watch(other)
         least = min(LEAST_WITNESSES, len(sighted) - 1)

@@ -45,17 +45,24 @@ class RangeView:
     """The range image of one frame, for any pattern of beams.
 
     Args:
-        points: (N, 3) metres, sensor coordinates; nearer ones than 1 m are the sensor's carrier.
+        points: (N, 3) metres, in the frame's coordinates; nearer ones to the viewpoint than 1 m are
+            the sensor's carrier.
         elevation_step: Radians between rows of the image, at least the gap between beams;
             `elevation_gap` measures it.
+        viewpoint: (3,) where the sensor is in these coordinates; at their start when None.
     """
 
-    def __init__(self, points: NDArray[Any], elevation_step: float) -> None:
+    def __init__(
+        self,
+        points: NDArray[Any],
+        elevation_step: float,
+        viewpoint: NDArray[np.float64] | None = None,
+    ) -> None:
+        self._viewpoint = np.zeros(3) if viewpoint is None else viewpoint
         self._step = float(np.clip(elevation_step, FINEST_ELEVATION_STEP, COARSEST_ELEVATION_STEP))
         self._rows = int(np.pi / self._step) + 2
         self._columns = FINEST_COLUMNS
-        x, y, z = np.ascontiguousarray(points.T, dtype=np.float32)
-        ranges = np.sqrt(x * x + y * y + z * z)
+        x, y, z, ranges = self._seen(points)
         pixels = self._pixels(x, y, z, ranges)[ranges > MIN_RANGE_M]
         flat = np.full(self._rows * self._columns, np.inf, dtype=np.float32)
         np.minimum.at(flat, pixels, ranges[ranges > MIN_RANGE_M])
@@ -66,12 +73,16 @@ class RangeView:
         self._nearest = np.where(rays >= MIN_RAYS, nearest, np.nan).ravel()
 
     def look(self, points: NDArray[Any]) -> Sighting:
-        """What the frame saw of places (N, 3), metres, in its sensor coordinates."""
-        x, y, z = np.ascontiguousarray(points.T, dtype=np.float32)
-        ranges = np.sqrt(x * x + y * y + z * z)
+        """What the frame saw of places (N, 3), metres, in its coordinates."""
+        x, y, z, ranges = self._seen(points)
         behind = self._nearest[self._pixels(x, y, z, ranges)] - ranges
         margin = MARGIN_M + MARGIN_PER_M * ranges
         return Sighting(through=behind > margin, met=np.abs(behind) <= margin)
+
+    def _seen(self, points: NDArray[Any]) -> tuple[NDArray[np.float32], ...]:
+        """x, y, z and range (N,) of points (N, 3) from the viewpoint."""
+        x, y, z = np.ascontiguousarray((points - self._viewpoint).T, dtype=np.float32)
+        return x, y, z, np.sqrt(x * x + y * y + z * z)
 
     def _pixels(
         self,

@@ -35,6 +35,7 @@ class SightedFrame:
 
     Attributes:
         registered: The frame and its pose.
+        viewpoint: (3,) metres: where the sensor is in the frame's coordinates.
         gap: Radians between neighbouring beams.
         view: What its rays passed through.
         rows: (M,) int64: the obstacles' rows among the frame's points.
@@ -48,16 +49,23 @@ class SightedFrame:
         met: (M,) int16: other frames that saw something at the place.
     """
 
-    def __init__(self, registered: RegisteredFrame, settings: MotionSettings) -> None:
+    def __init__(
+        self,
+        registered: RegisteredFrame,
+        settings: MotionSettings,
+        viewpoint: NDArray[np.float64] | None = None,
+    ) -> None:
         points = registered.frame.points
         beyond = np.abs(points).max(axis=1) > FARTHEST_ECHO_M
         # What no sensor can have seen counts as no return: it would stretch every grid.
         points = np.where(beyond[:, None], np.float32(0), points) if beyond.any() else points
         self.registered = registered
-        self.gap = elevation_gap(points)
-        self.view = RangeView(points, self.gap)
+        self.viewpoint = np.zeros(3) if viewpoint is None else viewpoint
+        rays = points - self.viewpoint
+        self.gap = elevation_gap(rays)
+        self.view = RangeView(points, self.gap, self.viewpoint)
         heights = estimate_terrain(points).height_above(points)
-        outside = np.einsum("ij,ij->i", points, points) > settings.min_range_m**2
+        outside = np.einsum("ij,ij->i", rays, rays) > settings.min_range_m**2
         standing = outside & (heights < settings.max_height_m)
         obstacle = heights >= settings.min_height_m
         self.rows = np.flatnonzero(standing & obstacle)
@@ -141,7 +149,7 @@ class SightedFrame:
         """When after the stamp the sweep passed points (N, 3), sensor coordinates: (N,) seconds."""
         if not self.is_timed:
             return np.zeros(len(points))
-        return self._seconds_by_azimuth[_azimuth_bins(points)]
+        return self._seconds_by_azimuth[_azimuth_bins(points - self.viewpoint)]
 
     @cached_property
     def is_timed(self) -> bool:
@@ -150,7 +158,7 @@ class SightedFrame:
 
     @cached_property
     def _seconds_by_azimuth(self) -> NDArray[np.float64]:
-        bins = _azimuth_bins(self.points)
+        bins = _azimuth_bins(self.points - self.viewpoint)
         counts = np.bincount(bins, minlength=AZIMUTH_BINS)
         sums = np.bincount(bins, self.seconds, minlength=AZIMUTH_BINS)
         full = np.flatnonzero(counts)

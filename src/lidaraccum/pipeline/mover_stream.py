@@ -6,8 +6,12 @@ import logging
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lidaraccum.data.perceived import PerceivedFrame
 from lidaraccum.data.registered import RegisteredFrame
+from lidaraccum.geometry.viewpoint import find_viewpoint
 from lidaraccum.pipeline.advice import Advice
 from lidaraccum.pipeline.association import Association
 from lidaraccum.pipeline.freespace import SightedFrame
@@ -41,6 +45,7 @@ class MoverStream:
         self._association = Association(settings, ids or ObjectIds())
         self._waiting: deque[SightedFrame] = deque()
         self._since_window = 0
+        self._viewpoint: NDArray[np.float64] | None = None
 
     def run(self, frames: Iterable[RegisteredFrame]) -> Iterator[PerceivedFrame]:
         """Each frame once, in order, its movers labelled and placed."""
@@ -52,7 +57,9 @@ class MoverStream:
             yield self._release()
 
     def _push(self, registered: RegisteredFrame) -> Iterator[PerceivedFrame]:
-        frame = SightedFrame(registered, self._settings)
+        if self._viewpoint is None:
+            self._viewpoint = find_viewpoint(registered.frame.points)
+        frame = SightedFrame(registered, self._settings, self._viewpoint)
         for other in list(self._waiting)[-(self._settings.window - 1) :]:
             frame.watch(other)
             other.watch(frame)

@@ -18,6 +18,7 @@ from lidaraccum.pipeline.suspects import Suspect, Template, make_template
 from lidaraccum.pipeline.verdict import (
     Verdict,
     as_met,
+    bend_course,
     judge,
     judge_points,
     refine_velocity,
@@ -27,6 +28,9 @@ from lidaraccum.pipeline.verdict import (
 TEMPLATE_POINTS = 80
 FIRST_LOOK_POINTS = 30
 REFINED_HYPOTHESES = 2
+WELL_EXPLAINED = 0.2
+"""What costs less on a straight course is not asked whether it turns."""
+
 PROBES = 5
 """So many of a longer window's frames, evenly over it, are asked for their verdict."""
 
@@ -131,13 +135,18 @@ def explain(
     turning = np.concatenate([[0.0], turns[chosen]])
     verdict = judge(template, rivals, probes, settings, turning)
     best = int(verdict.cost.argmin())
+    if best > 0 and turning[best] == 0 and verdict.cost[best] > WELL_EXPLAINED:
+        bent, turn = bend_course(template, rivals[best], probes, settings)
+        rivals, turning = np.concatenate([rivals, bent[None]]), np.append(turning, turn)
+        verdict = judge(template, rivals, probes, settings, turning)
+        best = int(verdict.cost.argmin())
     if not _is_motion(best, rivals, verdict, frames, settings):
         return None
     turn = float(turning[best])
     velocity = slide_velocity(template, rivals[best], probes, settings, turn)
     picked = gather(suspect, velocity, frames, settings, turn)
     return WindowObject(
-        picked=without_standing(picked, velocity, frames, settings),
+        picked=without_standing(picked, velocity, frames, settings, own.stamp, turn),
         velocity=velocity,
         centre=suspect.centre,
         stamp=own.stamp,
@@ -185,7 +194,9 @@ def gather(
         there = turned(velocity, turn * (source.stamp - frames[suspect.frame].stamp))
         picked = gathered[source.index]
         if number:
-            own = without_standing({source.index: picked}, there, frames, settings)
+            own = without_standing(
+                {source.index: picked}, there, frames, settings, source.stamp, turn
+            )
             picked = _accused_parts(own.get(source.index, picked[:0]), source, settings)
         if len(picked) == 0:
             break
@@ -263,8 +274,13 @@ def without_standing(
     velocity: NDArray[np.float64],
     frames: Sequence[SightedFrame],
     settings: MotionSettings,
+    stamp: float,
+    turn: float = 0.0,
 ) -> dict[int, NDArray[np.int64]]:
-    """The mover's points less what stands and only touches it (a parked car it passes)."""
+    """The mover's points less what stands and only touches it (a parked car it passes).
+
+    Its velocity (3,) is that at ``stamp``, its rate of turn in radians a second.
+    """
     kept = {}
     for frame in frames:
         if frame.index not in picked:
@@ -277,8 +293,8 @@ def without_standing(
             template = Template(
                 world, frame.heights[sample], frame.stamp, frame.seconds[sample], world.mean(axis=0)
             )
-            rivals = np.stack([np.zeros(3), velocity])
-            cost, _ = judge_points(template, rivals, frames, settings)
+            rivals = np.stack([np.zeros(3), turned(velocity, turn * (frame.stamp - stamp))])
+            cost, _ = judge_points(template, rivals, frames, settings, np.array([0.0, turn]))
             stands = cost[0] + STANDING_MARGIN < cost[1]
             _, nearest = cKDTree(frame.points[sample]).query(frame.points[doubtful])
             mine = np.setdiff1d(mine, doubtful[stands[nearest]])

@@ -26,6 +26,12 @@ WORTH_SLIDING = 0.01
 """So many faster and slower velocities are tried, a gate's width apart at the window's end; one is
 taken that costs so much less. The long side of a truck finds partners wherever it slides to."""
 
+BENDS = (0.1, 0.2, 0.4, 0.8, -0.1, -0.2, -0.4, -0.8)
+FINER = (0.75, 1.25)
+WORTH_BENDING = 0.05
+"""Turns over the window, radians, that are tried on what no straight course explains, shares of the
+best of them, and how much less one must cost than going straight."""
+
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
@@ -111,6 +117,41 @@ def slide_velocity(
         if bend > 0:
             return np.asarray(tried[best] + 0.5 * (before - after) / bend * step)
     return np.asarray(tried[best])
+
+
+def bend_course(
+    template: Template,
+    velocity: NDArray[np.float64],
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+) -> tuple[NDArray[np.float64], float]:
+    """The velocity (3,) and rate of turn, radians a second, that cost least, from a straight start.
+
+    Straight on unless some turn explains the points clearly better: going straight wins ties.
+    """
+    stamps = [frame.stamp for frame in frames]
+    turns = np.array(BENDS) / max(max(stamps) - min(stamps), 1e-6)
+    best, cost = (velocity, 0.0), _cost(template, velocity, 0.0, frames, settings) - WORTH_BENDING
+    for finer in (False, True):
+        start, about = best
+        if finer and about == 0:
+            break
+        for turn in (about * np.array(FINER) if finer else turns).tolist():
+            refined = refine_velocity(template, start, frames, settings, turn)
+            its_cost = _cost(template, refined, turn, frames, settings)
+            if its_cost < cost:
+                best, cost = (refined, turn), its_cost
+    return best
+
+
+def _cost(
+    template: Template,
+    velocity: NDArray[np.float64],
+    turn: float,
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+) -> float:
+    return float(judge(template, velocity[None], frames, settings, np.array([turn])).cost[0])
 
 
 def as_met(

@@ -15,6 +15,8 @@ FIRST_TEST_SEED = 2_000_000_000
 TEST_WINDOWS = 200
 TEST_SPEEDS_MPS = (0.0, 3.0, 7.0, 11.0, 15.0, 20.0, 25.0, 30.0)
 TEST_FRAMES = 5
+STRIDE = 61
+"""From one window of a sample to the next; without a factor in common with what is sampled."""
 
 
 def training_settings(index: int, frames: int = TEST_FRAMES) -> DriveSettings:
@@ -43,6 +45,19 @@ def held_out_settings(index: int, frames: int = TEST_FRAMES) -> DriveSettings:
         sensor=names[index % len(names)],
         speed_mps=TEST_SPEEDS_MPS[(index // len(names)) % len(TEST_SPEEDS_MPS)],
     )
+
+
+def held_out_numbers(count: int) -> list[int]:
+    """So many windows of the test set in which sensors take turns and every speed comes up.
+
+    Any number begins like a larger one, so few windows are a sample of many.
+
+    Raises:
+        SettingsError: When there are not so many.
+    """
+    if not 1 <= count <= TEST_WINDOWS:
+        raise SettingsError(f"the test set has {TEST_WINDOWS} windows, not {count}")
+    return [number * STRIDE % TEST_WINDOWS for number in range(count)]
 
 
 def held_out_windows(caster: RayCaster | None = None) -> Iterator[SimulatedSequence]:
