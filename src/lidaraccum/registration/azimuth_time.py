@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lidaraccum.geometry import rigid, voxel
 from lidaraccum.registration.firing import Seam
-from lidaraccum.registration.icp import align, jacobian, kernel_weights
+from lidaraccum.registration.icp import align, jacobian, kernel_weights, main_face
 from lidaraccum.registration.settings import RegistrationSettings
 from lidaraccum.registration.surface_map import SurfaceMap
 
@@ -108,7 +108,8 @@ class AzimuthTime:
             axis=1,
         )
         spread = max(1.48 * float(np.median(np.abs(distances))), MIN_SPREAD_M)
-        self._sum_up(slopes, distances, kernel_weights(matches)[near] / spread**2)
+        weights = kernel_weights(matches, main_face(matches)[1])
+        self._sum_up(slopes, distances, weights[near] / spread**2)
 
     def _sum_up(
         self,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from lidaraccum.data.frame import BoolArray
 from lidaraccum.geometry import rigid
 from lidaraccum.registration.surface_map import Matches, SurfaceMap
 
@@ -23,6 +24,11 @@ SCORE_GATE_M = 0.2
 HOLD = 2e-4
 """Weight, beside the average plane's 1, of staying at the start: it decides only directions that
 the planes leave open (along a tunnel), where it keeps the prediction."""
+
+MOST_FACE = 0.5
+LEANING = np.cos(np.deg2rad(15.0))
+"""With more than this share of the planes facing one way, those within this angle of it are taken
+to face that way."""
 
 STOP_RAD, STOP_M = 2e-5, 5e-4
 """An iteration that moves the pose by less than this is the last."""
@@ -84,24 +90,51 @@ def moved(pose: rigid.Pose, step: NDArray[np.float64]) -> rigid.Pose:
     return result
 
 
+def main_face(matches: Matches) -> tuple[NDArray[np.float64], BoolArray]:
+    """The way (3,) that most planes face, as the ground's do, and which (M,) face it; else none."""
+    normals, weights = matches.normals, matches.weights
+    spread = (normals * weights[:, None]).T @ normals / max(float(weights.sum()), 1e-9)
+    share, axes = np.linalg.eigh(spread)
+    if share[2] < MOST_FACE:
+        return axes[:, 2], np.zeros(len(normals), dtype=np.bool_)
+    return axes[:, 2], np.abs(normals @ axes[:, 2]) > LEANING
+
+
 def jacobian(arms: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
     """How distances (M,) change with a step (6,): arms (M, 3) reach from the sensor."""
     return np.concatenate([np.cross(arms, normals), normals], axis=1)
 
 
-def kernel_weights(matches: Matches) -> NDArray[np.float64]:
-    """Geman-McClure weights (M,) at the scale of the distances themselves, thin planes first."""
-    spread = 1.48 * float(np.median(np.abs(matches.distances)))
-    scale = float(np.clip(GATE_SPREADS * spread, MIN_SCALE_M, MAX_SCALE_M))
-    kernel = 1.0 / (1.0 + (matches.distances / scale) ** 2)
-    return matches.weights * kernel * kernel
+def kernel_weights(matches: Matches, alike: BoolArray) -> NDArray[np.float64]:
+    """Geman-McClure weights (M,) at the scale of the distances themselves, thin planes first.
+
+    Those that face one way (M,) have a scale of their own: much smooth ground would make outliers
+    of all that stands on it.
+    """
+    weights = matches.weights.copy()
+    for group in (alike, ~alike):
+        distances = matches.distances[group]
+        if len(distances):
+            spread = 1.48 * float(np.median(np.abs(distances)))
+            scale = float(np.clip(GATE_SPREADS * spread, MIN_SCALE_M, MAX_SCALE_M))
+            weights[group] /= (1.0 + (distances / scale) ** 2) ** 2
+    return weights
 
 
 def _solve(
     matches: Matches, arms: NDArray[np.float64], away: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    slopes = jacobian(arms, matches.normals)
-    weights = kernel_weights(matches)
+    """One step (6,).
+
+    The little by which each of the planes leans that face one way is roughness, or an error: a
+    voxel that one beam crossed knows its plane along the beam only, so the same beam a little
+    further fits best where the sensor has not moved. Such planes fix the way they face, no more.
+    """
+    face, alike = main_face(matches)
+    normals = matches.normals
+    normals = np.where(alike[:, None], (normals @ face)[:, None] * face, normals)
+    weights = kernel_weights(matches, alike)
+    slopes = jacobian(arms, normals)
     weighted = slopes * weights[:, None]
     hold = HOLD * weights.sum() * np.ones(6)
     gradient = weighted.T @ matches.distances + hold * away
@@ -122,7 +155,8 @@ def assess(
     # Points without a plane (new space, clutter) count as the average point does.
     share = len(matches.rows) / max(len(points), 1)
     slopes = jacobian(placed[matches.rows] - pose[:3, 3], matches.normals)
-    information = (slopes * kernel_weights(matches)[:, None]).T @ slopes
+    weights = kernel_weights(matches, main_face(matches)[1])
+    information = (slopes * weights[:, None]).T @ slopes
     return Alignment(
         pose,
         score=share * float((rarity * agreement).sum() / rarity.sum()),

@@ -41,6 +41,9 @@ SETTLED_M, SETTLED_RAD = 0.02, 0.001
 CLEARLY_BETTER = 0.96
 """Of two clocks one leaves less than this share of the other's distances to the map."""
 
+NO_WORSE = 1.0
+"""The share where the points say nothing of the clock."""
+
 LATE_CLOCK = (
     "motion within the sweep is undone from here on, which may move the pose by a part of it"
 )
@@ -148,11 +151,14 @@ class Odometry:
         passed = self._run(opening, first_clock, None)
         if len(passed) < 2:
             return passed
-        clock = self._look_at_sweep() or first_clock
+        seen = self._look_at_sweep()
+        if has_times and seen is None:
+            return self._better(opening, passed, first_clock, Compensated(), NO_WORSE)
+        clock = seen or first_clock
         if clock == first_clock == Compensated():
             return passed if self._is_steady(passed) else self._tried_again(opening, passed)
         if clock != first_clock and has_times:
-            return self._better(opening, passed, first_clock, clock)
+            return self._better(opening, passed, first_clock, clock, CLEARLY_BETTER)
         return self._settled(opening, passed, clock)
 
     def _better(
@@ -161,15 +167,17 @@ class Odometry:
         passed: list[RegisteredFrame],
         timed: SweepClock,
         seeming: SweepClock,
+        share: float,
     ) -> list[RegisteredFrame]:
-        """The first frames by the file's times where these fit clearly better than what seems so.
+        """The first frames by the file's times where these fit better than what seems so.
 
-        Equal steps of azimuth are seen from the sensor's place only: points in a vehicle's
-        coordinates look as if compensated.
+        Equal steps of azimuth are seen from the sensor's place only, and on one sensor's beams:
+        points in a vehicle's coordinates look as if compensated, two stacked sensors tell nothing.
+        Distances to the map must be less than a share of those without the times.
         """
         by_times = self._settled(opening, passed, timed)
         without = self._settled(opening, passed, seeming)
-        if _mean_residual(by_times) > CLEARLY_BETTER * _mean_residual(without):
+        if _mean_residual(by_times) > share * _mean_residual(without):
             return without
         return self._run(opening, timed, self._opening_twist(by_times))
 
