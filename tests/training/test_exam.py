@@ -31,8 +31,10 @@ def asked(monkeypatch: pytest.MonkeyPatch, toy: ModuleType) -> list[DriveSetting
 
 def test_windows_are_spread_over_the_test_set(asked: list[DriveSettings], toy: ModuleType) -> None:
     assert len(list(simulated_windows(4, 16.0, toy.SMALL))) == 4
-    places = [settings.seed - FIRST_TEST_SEED for settings in asked]
-    assert places == [0, TEST_WINDOWS // 4, TEST_WINDOWS // 2, 3 * TEST_WINDOWS // 4]
+    places = {settings.seed - FIRST_TEST_SEED for settings in asked}
+    assert len(places) == 4
+    assert min(places) >= 0
+    assert TEST_WINDOWS > max(places) >= min(places) + TEST_WINDOWS // 2
     assert all(settings.compensated for settings in asked)
 
 
