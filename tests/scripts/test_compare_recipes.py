@@ -119,6 +119,7 @@ def steps(folder: Path) -> list[int]:
     return [json.loads(line)["step"] for line in lines if line.endswith("\n")]
 
 
+@pytest.mark.slow
 def test_a_table_tells_the_mean_and_the_spread_of_the_runs(
     script: ModuleType, drives: Path, tmp_path: Path
 ) -> None:
