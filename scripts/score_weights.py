@@ -11,54 +11,28 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
 
-import numpy as np
 import torch
 from tqdm import tqdm
 
 from lidaraccum.evaluation import paper
+from lidaraccum.evaluation.report_tables import Table
 from lidaraccum.evaluation.scores import Scores as EvaluationScores
 from lidaraccum.evaluation.table import Row, row_of
-from lidaraccum.io.sequences import open_sequence
 from lidaraccum.metrics.segmentation import SegmentationCounts
 from lidaraccum.model.checkpoint import load_network
-from lidaraccum.model.settings import NetworkSettings
-from lidaraccum.simulation.drive import simulate
-from lidaraccum.simulation.windows import held_out_numbers, held_out_settings
 from lidaraccum.training.end_to_end import EndToEnd
+from lidaraccum.training.exam import recorded_windows, simulated_windows
 from lidaraccum.training.scores import scores_of
 from lidaraccum.training.stages import StageScores, score_stages
-from lidaraccum.training.truth import window_of
-from lidaraccum.training.window import Batch, make_batch
 
-WINDOW = 5
 STAGES = (
     "foreground_iou", "foreground_precision", "foreground_recall", "motion_iou",
     "motion_precision", "motion_recall", "ego_epe_m", "ego_epe_median_m", "offset_m",
     "object_epe_m", "object_still_m",
 )  # fmt: skip
-
-
-def test_windows(count: int, extent_m: float, settings: NetworkSettings) -> Iterator[Batch]:
-    """So many windows of the test set, all sensors and speeds among them."""
-    for number in held_out_numbers(count):
-        drawn = replace(held_out_settings(number), compensated=True)
-        drive = simulate(drawn)
-        yield make_batch([window_of(drive, range(len(drive)), settings, extent_m)])
-
-
-def drive_windows(
-    folder: Path, count: int, extent_m: float, settings: NetworkSettings
-) -> Iterator[Batch]:
-    """Windows of five frames spread evenly over a labelled drive, as its files are."""
-    drive = open_sequence(folder)
-    starts = np.unique(np.linspace(0, len(drive) - WINDOW, count).astype(int)).tolist()
-    for start in starts:
-        places = range(start, start + WINDOW)
-        yield make_batch([window_of(drive, places, settings, extent_m)])
 
 
 def whole_row(name: str, parts: list[StageScores]) -> Row:
@@ -75,12 +49,6 @@ def whole_row(name: str, parts: list[StageScores]) -> Row:
     return replace(row_of(name, scores), seconds=float("nan"))
 
 
-def tell(titles: list[str], rows: list[list[str]]) -> None:
-    """A Markdown table."""
-    for cells in (titles, ["---"] * len(titles), *rows):
-        print(f"| {' | '.join(cells)} |")
-
-
 def main() -> None:
     """Parse, score, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -93,15 +61,17 @@ def main() -> None:
     torch.set_num_threads(options.threads)
     network = load_network(options.weights)
     what = (options.windows, options.extent, network.settings)
-    batches = drive_windows(options.drive, *what) if options.drive else test_windows(*what)
+    batches = recorded_windows(options.drive, *what) if options.drive else simulated_windows(*what)
     began = time.monotonic()
     with torch.no_grad():
         parts = [score_stages(network, batch) for batch in tqdm(batches, total=options.windows)]
     print(f"{len(parts)} windows, {options.extent:g} m grid, {time.monotonic() - began:.0f} s\n")
-    tell(Row.titles(), [whole_row("network alone", parts).cells(), paper.WAYMO.cells()])
+    rows = [whole_row("network alone", parts).cells(), paper.WAYMO.cells()]
+    print(Table("The network alone", Row.titles(), rows).markdown(), end="\n\n")
     stages = asdict(scores_of(parts))
-    print("\nEach stage given the truth of those before it:\n")
-    tell(list(STAGES), [[f"{stages[name]:.3f}" for name in STAGES]])
+    cells = [f"{stages[name]:.3f}" for name in STAGES]
+    heading = "Each stage given the truth of those before it"
+    print(Table(heading, STAGES, [cells]).markdown())
 
 
 if __name__ == "__main__":

@@ -36,6 +36,16 @@ def test_about_two_million_weights() -> None:
     assert 1.5e6 < count < 2.5e6
 
 
+def test_where_the_affinity_starts_changes_no_other_fresh_weight(network: Network) -> None:
+    start = replace(network.settings, slack_start=-5.0, scale_start=-4.0)
+    usual = build_network(network.settings, 3).state_dict()
+    other = build_network(start, 3).state_dict()
+    changed = [name for name, value in usual.items() if not torch.equal(value, other[name])]
+    assert changed == ["matcher.offset", "matcher.scale"]
+    assert set(other["matcher.offset"].tolist()) == {-5.0}
+    assert set(other["matcher.scale"].tolist()) == {-4.0}
+
+
 @pytest.mark.parametrize("length", range(2, 12))
 def test_one_network_takes_any_number_of_frames(
     network: Network, frames: list[Frame], length: int

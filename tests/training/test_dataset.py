@@ -109,6 +109,23 @@ def test_training_validation_and_test_never_share_a_drive(
     assert max(validated) < FIRST_TEST_SEED <= min(tested)
 
 
+def test_sensors_that_are_named_and_no_others_drive_the_same_streets(
+    asked: list[DriveSettings], toy: ModuleType
+) -> None:
+    SimulatedDrives(toy.SMALL, toy.WINDOWS).make(4)
+    named = replace(toy.WINDOWS, sensors=("VLP-16", "OS1-64"))
+    for drive in range(12):
+        SimulatedDrives(toy.SMALL, named).make(drive)
+    SimulatedDrives(toy.SMALL, named).make(4)
+    usual, *others, again = asked
+    assert usual.sensor is None
+    assert {settings.sensor for settings in others} == {"VLP-16", "OS1-64"}
+    assert again == others[4]
+    assert replace(others[4], sensor=None) == usual
+    with pytest.raises(SettingsError, match="VLP-61"):
+        replace(toy.WINDOWS, sensors=("VLP-61",))
+
+
 @pytest.mark.parametrize(("seed", "drive"), [(190, 0), (0, 10_000_000)])
 def test_drives_beyond_the_training_seeds_are_refused(
     asked: list[DriveSettings], toy: ModuleType, seed: int, drive: int

@@ -10,6 +10,7 @@ import pytest
 
 from lidaraccum.errors import SettingsError
 from lidaraccum.training.kept import KeptDrives, StoredDrive, store_drive
+from lidaraccum.training.loader import store_all
 
 REACH_M = 8.0
 
@@ -73,6 +74,19 @@ def test_the_same_drive_is_cut_another_way_the_next_time(toy: ModuleType, tmp_pa
         first.frames[0].points, second.frames[0].points
     )
     assert not same
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [0, 1])
+def test_what_is_missing_is_made_and_nothing_else(
+    toy: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, workers: int
+) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))  # workers look for the car park, too
+    source = kept(toy, tmp_path, distinct=4)
+    source.stored(2)
+    assert list(store_all(source, workers)) == [0, 1, 3]
+    assert source.missing() == []
+    assert list(store_all(source, workers)) == []
 
 
 def test_none_is_not_a_number_of_drives(toy: ModuleType, tmp_path: Path) -> None:

@@ -22,8 +22,8 @@ from lidaraccum.training.window import Batch, make_batch
 
 SHARES = (
     "foreground_iou", "foreground_precision", "foreground_recall", "motion_iou",
-    "motion_precision", "motion_recall", "alone_motion_precision", "alone_motion_recall",
-    "static_acc_strict", "dynamic_acc_strict", "dynamic_acc_relaxed",
+    "motion_precision", "motion_recall", "alone_motion_iou", "alone_motion_precision",
+    "alone_motion_recall",    "static_acc_strict", "dynamic_acc_strict", "dynamic_acc_relaxed",
 )  # fmt: skip
 ERRORS = (
     "ego_epe_m", "ego_epe_median_m", "offset_m", "object_epe_m", "static_epe_m", "still_epe_m",

@@ -71,6 +71,18 @@ def _single(hint: Any, value: Any, name: str) -> Any:
     return value
 
 
+def merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Both tables, the upper one's values where both have one, table by table."""
+    both = dict(below)
+    for name, value in above.items():
+        under = both.get(name)
+        if isinstance(value, Mapping) and isinstance(under, Mapping):
+            both[name] = merged(under, value)
+        else:
+            both[name] = value
+    return both
+
+
 def toml_of(settings: Any, name: str) -> str:
     """A settings dataclass as TOML tables, the outermost called ``name``.
 

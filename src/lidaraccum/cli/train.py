@@ -12,7 +12,7 @@ import click
 
 from lidaraccum.cli import options
 from lidaraccum.cli.door import INTERRUPTED, Command
-from lidaraccum.cli.tables import settings_from, toml_of
+from lidaraccum.cli.tables import merged, settings_from, toml_of
 from lidaraccum.errors import OutputExistsError, SettingsError
 
 if TYPE_CHECKING:
@@ -114,18 +114,6 @@ def flags(params: Mapping[str, Any]) -> dict[str, Any]:
     if params["batch"] is not None:
         table["optimiser"] = {"batch": params["batch"]}
     return table
-
-
-def merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
-    """Both tables, the upper one's values where both have one, table by table."""
-    both = dict(below)
-    for name, value in above.items():
-        under = both.get(name)
-        if isinstance(value, Mapping) and isinstance(under, Mapping):
-            both[name] = merged(under, value)
-        else:
-            both[name] = value
-    return both
 
 
 def written(settings: TrainSettings, data: list[str]) -> str:

@@ -35,6 +35,11 @@ class Table:
     titles: Sequence[str]
     rows: Sequence[Sequence[str]]
 
+    def markdown(self) -> str:
+        """The same as Markdown, under its heading."""
+        lines = [_line(row) for row in (self.titles, ["---"] * len(self.titles), *self.rows)]
+        return "\n".join([f"### {self.heading}", "", *lines])
+
 
 def tables_of(report: EvaluationReport, sections: Sections) -> list[Table]:
     """All tables of a report, the paper's rows beside ours."""
@@ -134,15 +139,8 @@ def summary(report: EvaluationReport) -> list[str]:
 
 def markdown(report: EvaluationReport, sections: Sections | None = None) -> str:
     """The report's tables."""
-    parts = ["\n".join(summary(report))]
-    for table in tables_of(report, sections or Sections()):
-        lines = [
-            f"### {table.heading}",
-            "",
-            _line(table.titles),
-            _line(["---"] * len(table.titles)),
-        ]
-        parts.append("\n".join([*lines, *(_line(row) for row in table.rows)]))
+    tables = tables_of(report, sections or Sections())
+    parts = ["\n".join(summary(report)), *(table.markdown() for table in tables)]
     return "\n\n".join(parts) + "\n"
 
 

@@ -14,10 +14,6 @@ from lidaraccum.model.kabsch import exactly, fit_rigid, invert, move
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.model.sinkhorn import sinkhorn
 
-SLACK_START = -1.0
-SCALE_START = -3.0
-"""Where the affinity starts: fresh features, a good deal apart for any two places, must match a
-little (else there is no gradient) but mostly where they are alike (a soft start does not learn)."""
 SHARPEST = 0.02
 _LEAST_REACH_M = 1.0
 STANDING_M = 0.3
@@ -173,8 +169,8 @@ class Matcher(nn.Module):
     def __init__(self, settings: NetworkSettings) -> None:
         super().__init__()
         rounds = 1 + len(settings.rematch_m)
-        self.offset = nn.Parameter(torch.full((rounds,), SLACK_START))
-        self.scale = nn.Parameter(torch.full((rounds,), SCALE_START))
+        self.offset = nn.Parameter(torch.full((rounds,), settings.slack_start))
+        self.scale = nn.Parameter(torch.full((rounds,), settings.scale_start))
         self.rematch_m = settings.rematch_m
         self.sinkhorn_rounds = settings.sinkhorn_rounds
         self.fastest_mps = settings.fastest_mps

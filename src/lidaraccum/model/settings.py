@@ -26,6 +26,10 @@ class NetworkSettings:
             the first is that of the base features.
         ego_channels: Channels of the ego features.
         ego_pillars: Background pillars matched in each frame.
+        slack_start: Where the slack of the pillars' affinity starts, before softplus.
+        scale_start: Where its temperature starts, as a logarithm: lower is sharper. Fresh features,
+            a good deal apart for any two places, must match a little (else there is no gradient)
+            but mostly where they are alike (a soft start does not learn).
         sinkhorn_rounds: Row and column normalisations.
         fastest_mps: Nothing is matched to what it could only reach faster.
         rematch_m: How far a pillar may lie from its partner each time it is matched again, metres.
@@ -46,6 +50,8 @@ class NetworkSettings:
     base_widths: tuple[int, ...] = (32, 64, 128, 192)
     ego_channels: int = 64
     ego_pillars: int = 1024
+    slack_start: float = -1.0
+    scale_start: float = -3.0
     sinkhorn_rounds: int = 3
     fastest_mps: float = 40.0
     rematch_m: tuple[float, ...] = (3.0, 1.5, 0.7)

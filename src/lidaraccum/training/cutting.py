@@ -10,6 +10,7 @@ import numpy as np
 from lidaraccum.data.sequence import LabelledSequence
 from lidaraccum.errors import InputError, SettingsError
 from lidaraccum.model.settings import NetworkSettings
+from lidaraccum.simulation.settings import DriveSettings
 from lidaraccum.training.augment import AugmentSettings, LabelledFrame, augment
 from lidaraccum.training.truth import make_window
 from lidaraccum.training.window import TrainingWindow
@@ -28,6 +29,8 @@ class WindowSettings:
             fast car leaves most of the grid behind, and there is nothing left to compare.
         windows_per_drive: Windows cut out of one drive, overlapping, each augmented its own way.
         drive_frames: Frames of a simulated drive.
+        sensors: Sensors of simulated drives by name, each as likely as the others; all there are,
+            and made-up ones, when empty.
         augment: How windows are changed.
     """
 
@@ -37,16 +40,20 @@ class WindowSettings:
     longest_s: float = 0.8
     windows_per_drive: int = 4
     drive_frames: int = 10
+    sensors: tuple[str, ...] = ()
     augment: AugmentSettings = field(default_factory=AugmentSettings)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "lengths", tuple(self.lengths))
+        object.__setattr__(self, "sensors", tuple(self.sensors))
         if not self.lengths or min(self.lengths) < 2:
             raise SettingsError("a window has at least 2 frames")
         if max(self.lengths) > self.drive_frames:
             raise SettingsError("a drive has at least as many frames as its longest window")
         if self.windows_per_drive < 1 or self.largest_step < 1:
             raise SettingsError("windows_per_drive and largest_step are at least 1")
+        for name in self.sensors:
+            DriveSettings(sensor=name)  # refuses what no sensor is called
 
 
 def cut_windows(

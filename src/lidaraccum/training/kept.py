@@ -56,12 +56,19 @@ class KeptDrives:
 
     def stored(self, number: int) -> LabelledSequence:
         """A drive, made and stored unless it is there, cropped to what its windows can reach."""
-        path = self.folder / f"{number:06d}.npz"
+        path = self._path(number)
         if not path.exists():
             # A grid may be turned any way about the sensor: its corner reaches the furthest.
             reach = self.settings.extent_m * np.sqrt(0.5)
             store_drive(self.make_drive(number), path, reach)
         return StoredDrive(path)
+
+    def missing(self) -> list[int]:
+        """Numbers of the drives that are not stored yet."""
+        return [number for number in range(self.distinct) if not self._path(number).exists()]
+
+    def _path(self, number: int) -> Path:
+        return self.folder / f"{number:06d}.npz"
 
 
 def store_drive(drive: LabelledSequence, path: Path, reach_m: float) -> None:

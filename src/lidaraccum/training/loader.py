@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 from torch.utils.data import DataLoader, Dataset
 
 from lidaraccum.training.dataset import WindowSource
+from lidaraccum.training.kept import KeptDrives
 from lidaraccum.training.window import TrainingWindow
 from lidaraccum.training.workers import begin
 
@@ -25,8 +27,17 @@ class _Drives(Dataset[list[TrainingWindow]]):
         return self._source.windows(drive)
 
 
-def _as_it_is(drive: list[TrainingWindow]) -> list[TrainingWindow]:
-    return drive
+class _Kept(Dataset[int]):
+    def __init__(self, drives: KeptDrives) -> None:
+        self._drives = drives
+
+    def __getitem__(self, number: int) -> int:
+        self._drives.stored(number)
+        return number
+
+
+def _as_it_is(made: Any) -> Any:
+    return made
 
 
 def _begin(_worker: int) -> None:
@@ -53,14 +64,23 @@ def batches_from(
 
 def _drive_stream(source: WindowSource, first: int, workers: int) -> Iterator[list[TrainingWindow]]:
     most = 2**31 - 1
-    loader = DataLoader(
-        _Drives(source, most),
+    yield from _loader(_Drives(source, most), range(first, most), workers)
+
+
+def store_all(drives: KeptDrives, workers: int) -> Iterator[int]:
+    """Make the drives that are not stored yet; each one's number when it is."""
+    missing = drives.missing()
+    yield from _loader(_Kept(drives), missing, min(workers, len(missing)))
+
+
+def _loader(dataset: Dataset[Any], order: Sequence[int], workers: int) -> DataLoader[Any]:
+    return DataLoader(
+        dataset,
         batch_size=None,
-        sampler=range(first, most),
+        sampler=order,
         num_workers=workers,
         collate_fn=_as_it_is,
         prefetch_factor=_AHEAD if workers else None,
         multiprocessing_context="spawn" if workers else None,
         worker_init_fn=_begin,
     )
-    yield from loader

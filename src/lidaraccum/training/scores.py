@@ -44,7 +44,8 @@ class Scores:
         dynamic_acc_strict: Share of them within 5 cm or 5 %.
         dynamic_acc_relaxed: Share within 10 cm or 10 %.
         dynamic_robust_outlier: Share off by more than 30 cm and more than 30 %.
-        alone_motion_precision: Of annotated points, own poses, 0..1.
+        alone_motion_iou: Of annotated points, own poses, 0..1.
+        alone_motion_precision: 0..1.
         alone_motion_recall: 0..1.
         coverage: WCov of all objects, 0..1.
         moving_coverage: WCov of those that truly move, 0..1.
@@ -70,6 +71,7 @@ class Scores:
     dynamic_acc_strict: float
     dynamic_acc_relaxed: float
     dynamic_robust_outlier: float
+    alone_motion_iou: float
     alone_motion_precision: float
     alone_motion_recall: float
     coverage: float
@@ -114,6 +116,7 @@ def scores_of(answers: Sequence[StageScores]) -> Scores:
         dynamic_acc_strict=dynamic.acc_strict,
         dynamic_acc_relaxed=dynamic.acc_relaxed,
         dynamic_robust_outlier=dynamic.robust_outlier,
+        alone_motion_iou=alone.motion.iou,
         alone_motion_precision=alone.motion.precision,
         alone_motion_recall=alone.motion.recall,
         coverage=alone.association.weighted_coverage,

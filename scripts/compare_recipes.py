@@ -1,0 +1,129 @@
+"""Compares training recipes: each trained with each seed on one budget, scored, put into a table.
+
+Usage: compare_recipes.py RECIPES.toml -o FOLDER [--drive DIR]... [--dry-run]
+
+FOLDER gets table.md and table.json, written anew after each run, and NAME/seed-N of each run. What
+is done is not done again: stopped or killed, the same command goes on. scripts/recipes.toml is an
+example of RECIPES.toml and says what may stand in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from lidaraccum.cli.door import INTERRUPTED, Command
+from lidaraccum.cli.options import read_toml
+from lidaraccum.cli.tables import merged, settings_from
+from lidaraccum.cli.train_talk import Interrupts
+from lidaraccum.errors import SettingsError
+from lidaraccum.evaluation.recipe_table import recipe_data, recipe_tables
+from lidaraccum.io.atomic import write_json, write_text
+from lidaraccum.training.comparison import RunResult, compare
+from lidaraccum.training.recipes import PlanSettings, Recipe, check_plan
+from lidaraccum.training.settings import TrainSettings
+from lidaraccum.training.watch import Watch
+
+BASE, RECIPE, SET = "base", "recipe", "set"
+FOR_ALL = ("seed", "steps", "hours")
+"""Settings that the comparison decides for all of its runs."""
+
+
+@dataclass(frozen=True)
+class _Named:
+    """What a [[recipe]] table says beside what it sets."""
+
+    name: str = ""
+
+
+@click.command(cls=Command)
+@click.argument("recipes", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path, file_okay=False), required=True)
+@click.option(
+    "--drive",
+    "drives",
+    type=click.Path(path_type=Path, exists=True, file_okay=False, resolve_path=True),
+    multiple=True,
+    help="Score on this labelled recording, too.",
+)
+@click.option("--dry-run", is_flag=True, help="Say what would be run, do nothing.")
+@click.option("-v", "--verbose", is_flag=True, help="Say what is being done.")
+def main(recipes: Path, output: Path, drives: tuple[Path, ...], **params: Any) -> None:
+    """Train each recipe with each seed on one budget, score it, and leave a table."""
+    plan, listed = read_plan(read_toml(recipes), recipes.name)
+    plan = replace(plan, exam=replace(plan.exam, drives=(*plan.exam.drives, *drives)))
+    if params["dry_run"]:
+        tell_plan(plan, listed)
+        return
+    names, done = [recipe.name for recipe in listed], list[RunResult]()
+    with Interrupts() as interrupts:
+        for result in compare(plan, listed, output, Watch(wants_end=lambda: interrupts.came)):
+            done.append(result)
+            click.echo(f"{len(done)} of {len(listed) * len(plan.seeds)}: {told(result)}", err=True)
+            leave(output, names, done)
+    if interrupts.came:
+        click.get_current_context().exit(INTERRUPTED)
+
+
+def read_plan(file: Mapping[str, Any], name: str) -> tuple[PlanSettings, list[Recipe]]:
+    """What the file says: what all recipes have alike, and the recipes in order.
+
+    Raises:
+        SettingsError: It says what it may not, or what cannot be run.
+    """
+    own = {key: value for key, value in file.items() if key not in (BASE, RECIPE)}
+    plan = settings_from(PlanSettings, own, name)
+    base = _settings_table(file.get(BASE, {}), BASE)
+    tables = file.get(RECIPE, [])
+    if not isinstance(tables, list) or not tables:
+        raise SettingsError(f"{name} has no recipe", hint=f"each is a [[{RECIPE}]] table")
+    recipes = [_recipe(base, table) for table in tables]
+    check_plan(plan, recipes)
+    return plan, recipes
+
+
+def _recipe(base: Mapping[str, Any], table: Mapping[str, Any]) -> Recipe:
+    rest = {key: value for key, value in table.items() if key != SET}
+    name = settings_from(_Named, rest, RECIPE).name
+    mine = merged(base, _settings_table(table.get(SET, {}), f"{name}.{SET}"))
+    # The budget is the plan's: this one is never run.
+    return Recipe(name, settings_from(TrainSettings, mine | {"steps": 1}, name))
+
+
+def _settings_table(table: Any, name: str) -> Mapping[str, Any]:
+    if not isinstance(table, Mapping):
+        raise SettingsError(f"{name} is a table, not {table!r}")
+    for key in FOR_ALL:
+        if key in table:
+            hint = "seeds, minutes and windows stand before all tables"
+            raise SettingsError(f"[{name}] sets {key!r}, which all recipes have alike", hint=hint)
+    return table
+
+
+def tell_plan(plan: PlanSettings, recipes: list[Recipe]) -> None:
+    """What would be run."""
+    runs = len(recipes) * len(plan.seeds)
+    budget = f"{plan.minutes:g} minutes" if plan.windows is None else f"{plan.windows} windows"
+    click.echo(f"{len(recipes)} recipes, {len(plan.seeds)} seeds: {runs} runs of {budget} each.")
+    for recipe in recipes:
+        click.echo(recipe.name)
+
+
+def told(result: RunResult) -> str:
+    """A run in one line."""
+    rate = result.windows / result.seconds
+    return f"{result.recipe} seed {result.seed}: {result.windows} windows, {rate:.2f} a second"
+
+
+def leave(folder: Path, names: list[str], done: list[RunResult]) -> None:
+    """Write the tables of what is done so far."""
+    write_text(folder / "table.md", recipe_tables(names, done), overwrite=True)
+    write_json(folder / "table.json", recipe_data(names, done), overwrite=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,106 @@
+"""What finished weights are scored on: the simulator's test set, labelled recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import takewhile
+from pathlib import Path
+
+import numpy as np
+
+from lidaraccum.errors import InputError, SettingsError
+from lidaraccum.io.sequences import open_sequence
+from lidaraccum.model.network import Network
+from lidaraccum.model.settings import NetworkSettings
+from lidaraccum.simulation.drive import simulate
+from lidaraccum.simulation.windows import TEST_WINDOWS, held_out_numbers, held_out_settings
+from lidaraccum.training.scores import Scores, score_network
+from lidaraccum.training.truth import window_of
+from lidaraccum.training.window import Batch, make_batch
+
+WINDOW = 5
+
+
+@dataclass(frozen=True)
+class ExamSettings:
+    """What weights are scored on; five frames a window, the first the target.
+
+    Attributes:
+        windows: Of the simulator's test set, spread evenly over it.
+        extent_m: Side of the grid, metres.
+        drives: Folders with a labelled recording each, of different names.
+        drive_windows: Windows of each recording, spread evenly over it.
+    """
+
+    windows: int = 40
+    extent_m: float = 64.0
+    drives: tuple[Path, ...] = ()
+    drive_windows: int = 20
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.windows <= TEST_WINDOWS or self.drive_windows < 1:
+            raise SettingsError(
+                f"an exam has 0 to {TEST_WINDOWS} simulated windows and 1 or more of a recording"
+            )
+        if len({drive.name for drive in self.drives}) < len(self.drives):
+            raise SettingsError("recordings to score on need names of their own")
+
+
+@dataclass(frozen=True)
+class Marks:
+    """What weights scored.
+
+    Attributes:
+        simulated: On the simulator's test set.
+        recorded: On each recording, by its folder's name.
+    """
+
+    simulated: Scores
+    recorded: Mapping[str, Scores]
+
+
+def examine(
+    network: Network, settings: ExamSettings, wants_end: Callable[[], bool]
+) -> Marks | None:
+    """Score a network; None if that was ended before it was done.
+
+    Raises:
+        InputError: A recording cannot be read, or is too short.
+    """
+    size = (settings.extent_m, network.settings)
+
+    def score(batches: Iterator[Batch]) -> Scores:
+        return score_network(network, takewhile(lambda _: not wants_end(), batches))
+
+    simulated = score(simulated_windows(settings.windows, *size))
+    recorded = {
+        drive.name: score(recorded_windows(drive, settings.drive_windows, *size))
+        for drive in settings.drives
+    }
+    return None if wants_end() else Marks(simulated, recorded)
+
+
+def simulated_windows(count: int, extent_m: float, settings: NetworkSettings) -> Iterator[Batch]:
+    """So many windows of the simulator's test set, on a grid of that side, metres."""
+    for number in held_out_numbers(count) if count else ():
+        drawn = replace(held_out_settings(number), compensated=True)
+        drive = simulate(drawn)
+        yield make_batch([window_of(drive, range(len(drive)), settings, extent_m)])
+
+
+def recorded_windows(
+    folder: Path, count: int, extent_m: float, settings: NetworkSettings
+) -> Iterator[Batch]:
+    """Windows spread evenly over a labelled drive, as its files are.
+
+    Raises:
+        InputError: The drive cannot be read, or is shorter than a window.
+    """
+    drive = open_sequence(folder)
+    if len(drive) < WINDOW:
+        raise InputError(f"{folder} has {len(drive)} frames, too few for a window of {WINDOW}")
+    starts = np.unique(np.linspace(0, len(drive) - WINDOW, count).astype(int)).tolist()
+    for start in starts:
+        places = range(start, start + WINDOW)
+        yield make_batch([window_of(drive, places, settings, extent_m)])
