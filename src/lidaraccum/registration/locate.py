@@ -15,7 +15,8 @@ from lidaraccum.registration.surface_map import SurfaceMap
 
 COARSE_POINTS = 1200
 COARSE_ITERATIONS = 6
-SHORTLIST = 5
+SHORTLIST = 8
+ENDS = 4
 DISTINCT_M, DISTINCT_RAD = 0.3, 0.02
 """Two poses closer than this are one answer."""
 
@@ -52,9 +53,15 @@ def refine(surface: SurfaceMap, source: NDArray[np.float64], start: Hypothesis) 
 
 
 def search(
-    surface: SurfaceMap, source: NDArray[np.float64], starts: Sequence[Hypothesis]
+    surface: SurfaceMap,
+    source: NDArray[np.float64],
+    starts: Sequence[Hypothesis],
+    known: Located | None = None,
 ) -> Located:
-    """Follow every hypothesis on few points and coarse planes, the best two to their end."""
+    """Follow every hypothesis on few points and coarse planes, the best few to their end.
+
+    ``known`` is one that was followed to its end before: coarse planes may lead it astray.
+    """
     few = source[:: max(1, len(source) // COARSE_POINTS)]
     roughly = [
         (start.name, _aligned_coarsely(surface, few, start.world_from_sensor, level=2))
@@ -68,17 +75,19 @@ def search(
     tried.sort(key=lambda candidate: -candidate[1].score)
     ends = [
         refine(surface, source, Hypothesis(name, coarse.world_from_sensor))
-        for name, coarse in _distinct(tried)[:2]
+        for name, coarse in _distinct(tried)[:ENDS]
     ]
+    ends += [] if known is None else [known]
     ends.sort(key=lambda end: -end.alignment.score)
     best = ends[0]
-    if len(ends) == 1 or not are_distinct(_pose(best), _pose(ends[1])):
+    rival = next((end for end in ends if are_distinct(_pose(best), _pose(end))), None)
+    if rival is None:
         return best
     return Located(
         best.hypothesis,
         best.alignment,
-        rival=ends[1].alignment.score / max(best.alignment.score, 1e-9),
-        rival_distance_m=float(np.linalg.norm(_pose(best)[:3, 3] - _pose(ends[1])[:3, 3])),
+        rival=rival.alignment.score / max(best.alignment.score, 1e-9),
+        rival_distance_m=float(np.linalg.norm(_pose(best)[:3, 3] - _pose(rival)[:3, 3])),
     )
 
 

@@ -157,7 +157,7 @@ class Tracker:
 
     def _locate(self, source: NDArray[np.float64], expectation: Expectation) -> Located:
         """The likeliest start if it holds; otherwise the best of all that can be thought of."""
-        first = expectation.starts[0]
+        first, found = expectation.starts[0], None
         if expectation.known:
             found = refine(self._surface, source, first)
             if self._judge.trusts(found) and self._is_smooth(found, first, expectation.steps):
@@ -170,7 +170,7 @@ class Tracker:
         # How the sensor is mounted is unknown until it has moved once.
         axes = (2,) if expectation.known else (2, 0, 1)
         shifts = proposed(self._surface, source, first.world_from_sensor, reach, axes)
-        return search(self._surface, source, [*expectation.starts, *shifts])
+        return search(self._surface, source, [*expectation.starts, *shifts], found)
 
     def _is_smooth(self, found: Located, start: Hypothesis, steps: float) -> bool:
         interval_s = steps * self._pace.interval_s
