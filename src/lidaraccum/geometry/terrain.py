@@ -17,6 +17,15 @@ OPENING_CELLS = 7
 MAX_STEP_M = 0.6
 """A cell this far above the lowest ground around it holds no ground."""
 
+ROAD_REACH_M = 10.0
+ROAD_STEP_M = 0.3
+"""So near, the road is a plane, and a cell that begins so far above it holds no ground: close
+beside a van nothing of the road is in sight, and its sill would pass for the ground."""
+
+ROAD_SOFT_M = 0.1
+ROAD_ROUNDS = 10
+FEWEST_CELLS = 12
+
 _CELLS = int(2 * REACH_M / CELL_M)
 _DEPTH_MM = 1 << 17
 
@@ -55,8 +64,35 @@ def estimate_terrain(points: NDArray[Any]) -> Terrain:
     )
     with np.errstate(invalid="ignore"):
         ground = known & (low - opened < MAX_STEP_M)
+        ground &= ~(low - _road(low) > ROAD_STEP_M)
+    if not ground.any():
+        return Terrain(np.zeros((_CELLS, _CELLS)))
     nearest = ndimage.distance_transform_edt(~ground, return_distances=False, return_indices=True)
     return Terrain(ndimage.median_filter(low[tuple(nearest)], size=3))
+
+
+def _road(low: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Height (G, G) of the plane under the lowest of the cells near the sensor; NaN farther out.
+
+    What lies off the plane counts less and less. NaN too where few cells are known.
+    """
+    middle = (np.arange(_CELLS) + 0.5) * CELL_M - REACH_M
+    x, y = np.meshgrid(middle, middle, indexing="ij")
+    plane = np.full(low.shape, np.nan)
+    near = np.hypot(x, y) < ROAD_REACH_M
+    used = near & np.isfinite(low)
+    if used.sum() < FEWEST_CELLS:
+        return plane
+    place = np.column_stack([x[used], y[used], np.ones(int(used.sum()))])
+    height = low[used]
+    fit = np.array([0.0, 0.0, np.percentile(height, 25)])
+    for _ in range(ROAD_ROUNDS):
+        above = height - place @ fit
+        weights = 1.0 / (1.0 + (np.abs(above) / ROAD_SOFT_M) ** 2)
+        weighted = place * weights[:, None]
+        fit = np.linalg.solve(weighted.T @ place + 1e-3 * np.eye(3), weighted.T @ height)
+    plane[near] = fit[0] * x[near] + fit[1] * y[near] + fit[2]
+    return plane
 
 
 def _low_points(points: NDArray[Any]) -> NDArray[np.float64]:

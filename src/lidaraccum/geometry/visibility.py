@@ -23,6 +23,9 @@ MARGIN_PER_M = 0.01
 """A ray must end this far behind a place (and this much more per metre of range) to have passed
 through it: more than noise, registration error and uncompensated motion within a sweep."""
 
+SPECK_SHARE = 0.1
+"""An echo is a speck where no other about it is as far, give or take this share of its range."""
+
 MIN_RAYS = 6
 """Pixels with rays, of the nine about a place, below which nothing is known about it."""
 
@@ -66,18 +69,27 @@ class RangeView:
         pixels = self._pixels(x, y, z, ranges)[ranges > MIN_RANGE_M]
         flat = np.full(self._rows * self._columns, np.inf, dtype=np.float32)
         np.minimum.at(flat, pixels, ranges[ranges > MIN_RANGE_M])
-        image = _without_gaps(flat.reshape(self._rows, self._columns))
-        self._columns = image.shape[1]
-        nearest = _over_neighbours(np.minimum, image)
-        rays = _over_neighbours(np.add, np.isfinite(image).astype(np.int8))
-        self._nearest = np.where(rays >= MIN_RAYS, nearest, np.nan).ravel()
+        image = flat.reshape(self._rows, self._columns)
+        seen = np.flatnonzero(np.isfinite(image).any(axis=1))
+        # A spinning sensor looks at a band; one row about it, and nothing is known beyond.
+        first, last = (max(seen[0] - 1, 0), seen[-1] + 2) if len(seen) else (0, 0)
+        band = _without_gaps(image[first:last])
+        self._columns = band.shape[1]
+        unknown = np.full((self._rows, self._columns), np.nan, dtype=np.float32)
+        self._nearest, self._nearest_solid = unknown.ravel(), unknown.copy().ravel()
+        if len(band):
+            place = slice(first * self._columns, first * self._columns + band.size)
+            self._nearest[place] = _nearest_about(band)
+            self._nearest_solid[place] = _nearest_about(_without_specks(band))
 
     def look(self, points: NDArray[Any]) -> Sighting:
         """What the frame saw of places (N, 3), metres, in its coordinates."""
         x, y, z, ranges = self._seen(points)
-        behind = self._nearest[self._pixels(x, y, z, ranges)] - ranges
+        pixels = self._pixels(x, y, z, ranges)
         margin = MARGIN_M + MARGIN_PER_M * ranges
-        return Sighting(through=behind > margin, met=np.abs(behind) <= margin)
+        behind = self._nearest_solid[pixels] - ranges
+        met = (np.abs(behind) <= margin) | (np.abs(self._nearest[pixels] - ranges) <= margin)
+        return Sighting(through=(behind > margin) & ~met, met=met)
 
     def _seen(self, points: NDArray[Any]) -> tuple[NDArray[np.float32], ...]:
         """x, y, z and range (N,) of points (N, 3) from the viewpoint."""
@@ -106,6 +118,31 @@ def _without_gaps(image: NDArray[np.float32]) -> NDArray[np.float32]:
             break
         image = wider
     return image
+
+
+def _nearest_about(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Nearest range about each pixel of (R, C), flat; NaN where too few rays went to tell."""
+    rays = _over_neighbours(np.add, np.isfinite(image).astype(np.int8))
+    return np.where(rays >= MIN_RAYS, _over_neighbours(np.minimum, image), np.nan).ravel()
+
+
+def _without_specks(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The image (R, C) without echoes that none of the eight about them is as far as.
+
+    Rain, snow, fog and dust return a ray here and there; they hide nothing.
+    """
+    wide = np.concatenate([image[:, -1:], image, image[:, :1]], axis=1)
+    tall = np.concatenate([wide[:1], wide, wide[-1:]])
+    tall[[0, -1]] = np.inf
+    rows, columns = image.shape
+    alone = np.isfinite(image)
+    with np.errstate(invalid="ignore"):
+        for down in range(3):
+            for right in range(3):
+                if down != 1 or right != 1:
+                    beside = tall[down : down + rows, right : right + columns]
+                    alone &= ~(np.abs(beside - image) < SPECK_SHARE * image)
+    return np.where(alone, np.float32(np.inf), image)
 
 
 def _over_neighbours(combine: np.ufunc, image: NDArray[Any]) -> NDArray[Any]:

@@ -9,18 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from lidaraccum.geometry.clustering import connected_cells
-from lidaraccum.geometry.voxel import thin
-from lidaraccum.pipeline.courses import are_alike, carried, turned
+from lidaraccum.pipeline.courses import are_alike, turned
 from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.gathering import gather, without_standing
 from lidaraccum.pipeline.motion_settings import MotionSettings
-from lidaraccum.pipeline.suspects import Suspect, Template, make_template
+from lidaraccum.pipeline.suspects import Suspect, make_template
 from lidaraccum.pipeline.verdict import (
     Verdict,
-    as_met,
     bend_course,
     judge,
-    judge_points,
     refine_velocity,
     slide_velocity,
 )
@@ -33,21 +30,6 @@ WELL_EXPLAINED = 0.2
 
 PROBES = 5
 """So many of a longer window's frames, evenly over it, are asked for their verdict."""
-
-JOIN_M = 0.4
-WHOLE_SHARE = 0.5
-WHOLE_GROWTH = 2.5
-"""A frame's points this near to the moved cluster are its points; so is all of a cluster of which
-they are more than this share, unless it has so many times the points."""
-
-GATHERINGS = 3
-MOST_GROWTH = 8.0
-"""What has so many times the points at one distance is something else: a wall that was touched."""
-
-STANDING_SHARE = 0.1
-STANDING_MARGIN = 0.1
-"""With more than this share of points that were met and never seen through, each is asked whether
-standing costs it so much less than moving."""
 
 SAME_GAP_M = 0.8
 SAME_SPEED_MPS = 0.8
@@ -174,135 +156,6 @@ def _is_motion(
     )
 
 
-def gather(
-    suspect: Suspect,
-    velocity: NDArray[np.float64],
-    frames: Sequence[SightedFrame],
-    settings: MotionSettings,
-    turn: float = 0.0,
-) -> dict[int, NDArray[np.int64]]:
-    """By frame index: the obstacles (K,) of each frame that the moved suspect lies on.
-
-    A suspect may be no more than the end of a truck that was seen through. So what the fullest
-    frame shows of it is moved to all others in turn, as long as another becomes the fullest; but
-    not what stands or hides there, and then only clusters that are its as a whole are added: a
-    wall it touches goes on and on.
-    """
-    source = frames[suspect.frame]
-    gathered = {source.index: suspect.picked}
-    for number in range(GATHERINGS):
-        there = turned(velocity, turn * (source.stamp - frames[suspect.frame].stamp))
-        picked = gathered[source.index]
-        if number:
-            own = without_standing(
-                {source.index: picked}, there, frames, settings, source.stamp, turn
-            )
-            picked = _accused_parts(own.get(source.index, picked[:0]), source, settings)
-        if len(picked) == 0:
-            break
-        found = _lain_on(source, picked, there, frames, turn, whole_only=number > 0)
-        for index, more in found.items():
-            known = gathered.get(index)
-            gathered[index] = more if known is None else np.union1d(known, more)
-        fullest = max(frames, key=lambda frame: len(gathered.get(frame.index, ())))
-        if fullest is source:
-            break
-        source = fullest
-    return gathered
-
-
-def _accused_parts(
-    picked: NDArray[np.int64], frame: SightedFrame, settings: MotionSettings
-) -> NDArray[np.int64]:
-    """The picked obstacles (K,) in parts that others saw through; not what nobody could see."""
-    part = connected_cells(frame.points[picked], settings.cell_m)
-    share = np.bincount(part, frame.through[picked] > 0) / np.maximum(np.bincount(part), 1)
-    return picked[share[part] >= settings.seed_share]
-
-
-def _lain_on(
-    own: SightedFrame,
-    picked: NDArray[np.int64],
-    velocity: NDArray[np.float64],
-    frames: Sequence[SightedFrame],
-    turn: float,
-    *,
-    whole_only: bool,
-) -> dict[int, NDArray[np.int64]]:
-    """By frame index: the obstacles (K,) of other frames that some of this one's, moved, lie on."""
-    world, heights = own.world(picked), own.heights[picked]
-    gathered = {}
-    for frame in frames:
-        if frame is own:
-            continue
-        seconds = frame.stamp - own.stamp
-        moved = carried(world, world.mean(axis=0), velocity, turn, seconds)
-        local = as_met(moved, velocity, own.seconds[picked], frame)
-        found = _points_at(frame, frame.places(local, heights), whole_only=whole_only)
-        nearer = max(1.0, _mean_range(own.points[picked]) / max(_mean_range(local), 0.1))
-        if 0 < len(found) < MOST_GROWTH * len(picked) * nearer**2:
-            gathered[frame.index] = found
-    return gathered
-
-
-def _mean_range(points: NDArray[np.float64]) -> float:
-    return float(np.linalg.norm(points, axis=1).mean())
-
-
-def _points_at(
-    frame: SightedFrame, places: NDArray[np.float64], *, whole_only: bool
-) -> NDArray[np.int64]:
-    x, y = frame.level
-    low, high = places.min(axis=0) - JOIN_M, places.max(axis=0) + JOIN_M
-    about = np.flatnonzero((x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]))
-    if len(about) == 0:
-        return about
-    own = frame.places(frame.points[about], frame.heights[about])
-    distance, _ = cKDTree(places).query(own, distance_upper_bound=JOIN_M)
-    close = about[np.isfinite(distance)]
-    sizes = frame.segment_sizes
-    shares = np.bincount(frame.segments[close], minlength=len(sizes)) / sizes
-    whole = (shares > WHOLE_SHARE) & (sizes < WHOLE_GROWTH * len(places))
-    keep = whole[frame.segments]
-    if not whole_only:
-        keep[close] = True
-    return np.flatnonzero(keep)
-
-
-def without_standing(
-    picked: Mapping[int, NDArray[np.int64]],
-    velocity: NDArray[np.float64],
-    frames: Sequence[SightedFrame],
-    settings: MotionSettings,
-    stamp: float,
-    turn: float = 0.0,
-) -> dict[int, NDArray[np.int64]]:
-    """The mover's points less what stands and only touches it (a parked car it passes).
-
-    Its velocity (3,) is that at ``stamp``, its rate of turn in radians a second.
-    """
-    kept = {}
-    for frame in frames:
-        if frame.index not in picked:
-            continue
-        mine = picked[frame.index]
-        doubtful = mine[(frame.through[mine] == 0) & (frame.met[mine] > 0)]
-        if len(doubtful) > STANDING_SHARE * len(mine):
-            sample = doubtful[thin(frame.points[doubtful], 0.2)]
-            world = frame.world(sample)
-            template = Template(
-                world, frame.heights[sample], frame.stamp, frame.seconds[sample], world.mean(axis=0)
-            )
-            rivals = np.stack([np.zeros(3), turned(velocity, turn * (frame.stamp - stamp))])
-            cost, _ = judge_points(template, rivals, frames, settings, np.array([0.0, turn]))
-            stands = cost[0] + STANDING_MARGIN < cost[1]
-            _, nearest = cKDTree(frame.points[sample]).query(frame.points[doubtful])
-            mine = np.setdiff1d(mine, doubtful[stands[nearest]])
-        if len(mine):
-            kept[frame.index] = mine
-    return kept
-
-
 def join_parts(
     objects: Sequence[WindowObject], frames: Sequence[SightedFrame], settings: MotionSettings
 ) -> list[WindowObject]:
@@ -353,10 +206,13 @@ def _goes_with(
 
 
 def _touch(part: WindowObject, whole: WindowObject, frames: Sequence[SightedFrame]) -> bool:
+    """Whether some frame shows them close together, or as ends of one cluster."""
     for frame in frames:
         if frame.index in part.picked and frame.index in whole.picked:
-            body = cKDTree(frame.points[whole.picked[frame.index]])
-            distance, _ = body.query(frame.points[part.picked[frame.index]])
+            some, others = part.picked[frame.index], whole.picked[frame.index]
+            if np.isin(frame.segments[some], frame.segments[others]).any():
+                return True
+            distance, _ = cKDTree(frame.points[others]).query(frame.points[some])
             if distance.min() < SAME_GAP_M:
                 return True
     return False

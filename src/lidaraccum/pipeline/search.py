@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lidaraccum.pipeline.courses import are_alike
 from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.gathering import with_middle
 from lidaraccum.pipeline.hypotheses import propose
 from lidaraccum.pipeline.motion_settings import SURE, MotionSettings
 from lidaraccum.pipeline.objects import Expectation, WindowObject, explain, join_parts
@@ -69,7 +70,10 @@ def find_objects(
             movers = (
                 _settle([_meant(found, lead, frames)], movers, frames, 1.0) if found else movers
             )
-    return join_parts(movers, frames, settings)
+    return [
+        replace(one, picked=with_middle(one.picked, one.velocity, frames, one.stamp, one.turn))
+        for one in join_parts(movers, frames, settings)
+    ]
 
 
 def _accused(
