@@ -52,3 +52,13 @@ def test_order_does_not_matter_and_nothing_has_a_ground() -> None:
     shuffled = np.random.default_rng(3).permutation(floor)
     assert (estimate_terrain(floor).heights == estimate_terrain(shuffled).heights).all()
     assert (estimate_terrain(np.zeros((0, 3))).heights == 0).all()
+
+
+def test_a_van_close_beside_the_sensor_hides_its_ground_but_is_none() -> None:
+    floor = ground()
+    blind = np.hypot(floor[:, 0], floor[:, 1]) < 4.0
+    behind = (np.abs(floor[:, 0]) < 1.2 * floor[:, 1]) & (floor[:, 1] > 2.5)
+    rng = np.random.default_rng(2)
+    side = rng.uniform((-3.0, 2.5, 0.3), (3.0, 2.6, 2.2), (3000, 3)) + np.array([0, 0, -1.7])
+    terrain = estimate_terrain(np.concatenate([floor[~blind & ~behind], side]))
+    np.testing.assert_allclose(terrain.height_above(side), side[:, 2] + 1.7, atol=0.15)

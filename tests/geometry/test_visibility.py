@@ -74,3 +74,32 @@ def test_the_gap_between_beams_is_measured(beams: int) -> None:
 
 def test_the_gap_of_nothing_is_coarse() -> None:
     assert elevation_gap(np.zeros((0, 3))) > np.radians(1.0)
+
+
+def test_specks_in_the_air_hide_nothing() -> None:
+    rng = np.random.default_rng(4)
+    wall = sphere(20.0)
+    specks = rng.random(len(wall)) < 0.08
+    clutter = wall[specks] * rng.uniform(0.06, 0.2, (int(specks.sum()), 1))
+    view = RangeView(np.concatenate([wall[~specks], clutter]), np.radians(40 / 39))
+    places = np.concatenate([at(10.0, azimuth) for azimuth in np.arange(0.0, 360.0, 3.0)])
+    assert view.look(places).through.mean() > 0.8
+
+
+def test_a_wide_thing_close_by_hides_what_is_behind_it() -> None:
+    wall = sphere(20.0)
+    near = np.abs(np.arctan2(wall[:, 1], wall[:, 0])) < np.radians(5)
+    view = RangeView(np.where(near[:, None], 0.2 * wall, wall), np.radians(40 / 39))
+    behind = view.look(at(10.0, 0.0))
+    assert not behind.through.any()
+    assert not behind.met.any()
+    assert view.look(at(4.0, 0.0)).met.all()
+
+
+def test_the_viewpoint_is_where_one_looks_from() -> None:
+    mount = np.array([0.4, -0.1, 1.9])
+    places = np.concatenate([at(10.0, 40.0), at(20.1, 40.0), at(25.0, 40.0)])
+    seen = RangeView(sphere(20.0), np.radians(40 / 39)).look(places)
+    moved = RangeView(sphere(20.0) + mount, np.radians(40 / 39), mount).look(places + mount)
+    np.testing.assert_array_equal(moved.through, seen.through)
+    np.testing.assert_array_equal(moved.met, seen.met)
