@@ -26,7 +26,9 @@ TEMPLATE_POINTS = 80
 FIRST_LOOK_POINTS = 30
 REFINED_HYPOTHESES = 2
 WELL_EXPLAINED = 0.2
-"""What costs less on a straight course is not asked whether it turns."""
+WORTH_A_BEND = 0.3
+"""What costs less on a straight course is not asked whether it turns, nor is what saves less than
+this share of the margin by it."""
 
 PROBES = 5
 """So many of a longer window's frames, evenly over it, are asked for their verdict."""
@@ -117,7 +119,12 @@ def explain(
     turning = np.concatenate([[0.0], turns[chosen]])
     verdict = judge(template, rivals, probes, settings, turning)
     best = int(verdict.cost.argmin())
-    if best > 0 and turning[best] == 0 and verdict.cost[best] > WELL_EXPLAINED:
+    saved = float(verdict.cost[0] - verdict.cost[best])
+    if (
+        turning[best] == 0
+        and verdict.cost[best] > WELL_EXPLAINED
+        and saved > WORTH_A_BEND * settings.margin
+    ):
         bent, turn = bend_course(template, rivals[best], probes, settings)
         rivals, turning = np.concatenate([rivals, bent[None]]), np.append(turning, turn)
         verdict = judge(template, rivals, probes, settings, turning)

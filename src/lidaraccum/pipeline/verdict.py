@@ -27,10 +27,12 @@ WORTH_SLIDING = 0.01
 taken that costs so much less. The long side of a truck finds partners wherever it slides to."""
 
 BENDS = (0.1, 0.2, 0.4, 0.8, -0.1, -0.2, -0.4, -0.8)
+BENDS_REFINED = 2
 FINER = (0.75, 1.25)
 WORTH_BENDING = 0.05
-"""Turns over the window, radians, that are tried on what no straight course explains, shares of the
-best of them, and how much less one must cost than going straight."""
+"""Turns over the window, radians, that are tried on what no straight course explains, how many of
+them are refined, shares of the best that are tried then, and how much less one must cost than going
+straight."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,13 +132,15 @@ def bend_course(
     Straight on unless some turn explains the points clearly better: going straight wins ties.
     """
     stamps = [frame.stamp for frame in frames]
-    turns = np.array(BENDS) / max(max(stamps) - min(stamps), 1e-6)
-    best, cost = (velocity, 0.0), _cost(template, velocity, 0.0, frames, settings) - WORTH_BENDING
+    turns = np.array((0.0, *BENDS)) / max(max(stamps) - min(stamps), 1e-6)
+    costs = judge(template, np.tile(velocity, (len(turns), 1)), frames, settings, turns).cost
+    best, cost = (velocity, 0.0), float(costs[0]) - WORTH_BENDING
+    promising = turns[1:][np.argsort(costs[1:], kind="stable")[:BENDS_REFINED]]
     for finer in (False, True):
         start, about = best
         if finer and about == 0:
             break
-        for turn in (about * np.array(FINER) if finer else turns).tolist():
+        for turn in (about * np.array(FINER) if finer else promising).tolist():
             refined = refine_velocity(template, start, frames, settings, turn)
             its_cost = _cost(template, refined, turn, frames, settings)
             if its_cost < cost:
