@@ -24,8 +24,9 @@ from lidaraccum.pipeline.search import find_objects
 log = logging.getLogger(__name__)
 
 MOST_MOVING = 0.3
-"""Where a pose is doubtful and more than this share of all obstacles of a window seems to move, it
-is the pose that is wrong."""
+MOST_MOVING_IN_DOUBT = 0.1
+"""Where a pose is doubtful and more than the first share of all obstacles of a window seems to
+move, it is the pose that is wrong; where most poses are, the second."""
 
 
 class MoverStream:
@@ -103,8 +104,9 @@ def _is_pose_wrong(found: Sequence[WindowObject], window: Sequence[SightedFrame]
     doubtful = [frame.index for frame in window if frame.registered.quality.doubts]
     if not doubtful:
         return False
+    most = MOST_MOVING_IN_DOUBT if 2 * len(doubtful) > len(window) else MOST_MOVING
     moving = sum(len(picked) for one in found for picked in one.picked.values())
-    if moving <= MOST_MOVING * sum(len(frame.rows) for frame in window):
+    if moving <= most * sum(len(frame.rows) for frame in window):
         return False
     log.warning(
         "nothing is called moving around frame %d: its pose is doubtful, and too much would be",
