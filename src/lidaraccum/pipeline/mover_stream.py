@@ -14,6 +14,7 @@ from lidaraccum.data.registered import RegisteredFrame
 from lidaraccum.geometry.viewpoint import find_viewpoint
 from lidaraccum.pipeline.advice import Advice
 from lidaraccum.pipeline.association import Association
+from lidaraccum.pipeline.courses import are_alike
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.object_ids import ObjectIds
@@ -24,9 +25,10 @@ from lidaraccum.pipeline.search import find_objects
 log = logging.getLogger(__name__)
 
 MOST_MOVING = 0.3
-MOST_MOVING_IN_DOUBT = 0.1
-"""Where a pose is doubtful and more than the first share of all obstacles of a window seems to
-move, it is the pose that is wrong; where most poses are, the second."""
+MOST_MOVING_AS_ONE = 0.1
+AS_ONE_MPS = 1.0
+"""Where a pose is doubtful and more than this share of all obstacles of a window seems to move, it
+is the pose that is wrong; where all of it, several things, moves as one, the second share."""
 
 
 class MoverStream:
@@ -104,7 +106,9 @@ def _is_pose_wrong(found: Sequence[WindowObject], window: Sequence[SightedFrame]
     doubtful = [frame.index for frame in window if frame.registered.quality.doubts]
     if not doubtful:
         return False
-    most = MOST_MOVING_IN_DOUBT if 2 * len(doubtful) > len(window) else MOST_MOVING
+    velocities = [one.velocity for one in found]
+    as_one = all(are_alike(velocities[0], other, AS_ONE_MPS, 0.0) for other in velocities[1:])
+    most = MOST_MOVING_AS_ONE if len(found) > 1 and as_one else MOST_MOVING
     moving = sum(len(picked) for one in found for picked in one.picked.values())
     if moving <= most * sum(len(frame.rows) for frame in window):
         return False
