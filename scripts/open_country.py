@@ -47,9 +47,7 @@ def main() -> None:
             print(f"{what}: {errors[-1]:.2f} m", *doubts, sep="; ", flush=True)
     error = np.array(errors)
     near = error <= FAR_OFF_M
-    print(
-        f"over {FAR_OFF_M} m: {(~near).sum()} of {len(error)}; mean of others {error[near].mean():.3f} m"
-    )
+    print(f"over {FAR_OFF_M} m: {(~near).sum()} of {len(error)}; others {error[near].mean():.3f} m")
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ REFINED_HYPOTHESES = 2
 WELL_EXPLAINED = 0.2
 WORTH_A_BEND = 0.3
 """What costs less on a straight course is not asked whether it turns, nor is what saves less than
-this share of the margin by it."""
+this share of the margin by it; nor anything where a pose is doubtful, whose slip a turn explains."""
 
 PROBES = 5
 """So many of a longer window's frames, evenly over it, are asked for their verdict."""
@@ -124,6 +124,7 @@ def explain(
         turning[best] == 0
         and verdict.cost[best] > WELL_EXPLAINED
         and saved > WORTH_A_BEND * settings.margin
+        and not any(frame.registered.quality.doubts for frame in frames)
     ):
         bent, turn = bend_course(template, rivals[best], probes, settings)
         rivals, turning = np.concatenate([rivals, bent[None]]), np.append(turning, turn)
