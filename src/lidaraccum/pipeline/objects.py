@@ -28,7 +28,7 @@ REFINED_HYPOTHESES = 2
 WELL_EXPLAINED = 0.2
 WORTH_A_BEND = 0.3
 """What costs less on a straight course is not asked whether it turns, nor is what saves less than
-this share of the margin by it; nor anything where a pose is doubtful, whose slip a turn explains."""
+this share of the margin by it; nor is anything where a pose is doubtful: turns explain slips."""
 
 PROBES = 5
 """So many of a longer window's frames, evenly over it, are asked for their verdict."""
