@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from lidaraccum.geometry.ground import LEAST_MOUNT_M, estimate_ground
 
 NEAREST_M, FARTHEST_M = 3.0, 60.0
+FARTHEST_ECHO_M = 1_000.0
+"""Farther points are damage, not echoes."""
+
 MOST_POINTS = 40_000
 STEP_RAD = np.deg2rad(0.5)
 UNLIKE = 0.1
@@ -36,10 +39,11 @@ def find_viewpoint(points: NDArray[Any]) -> NDArray[np.float64]:
     then, enough to ask what was seen through.
     """
     start = np.zeros(3)
-    if len(points) == 0 or estimate_ground(points).level_from_sensor[2, 3] >= LEAST_MOUNT_M:
+    about = points[np.abs(points).max(axis=1, initial=0.0) < FARTHEST_ECHO_M].astype(np.float64)
+    if len(about) == 0 or estimate_ground(about).level_from_sensor[2, 3] >= LEAST_MOUNT_M:
         return start
-    ranges = np.linalg.norm(points, axis=1)
-    seen = points[(ranges > NEAREST_M) & (ranges < FARTHEST_M)].astype(np.float64)
+    ranges = np.linalg.norm(about, axis=1)
+    seen = about[(ranges > NEAREST_M) & (ranges < FARTHEST_M)]
     seen = seen[:: max(1, -(-len(seen) // MOST_POINTS))]
     place = _raised(seen, start)
     place = _raised(seen, _moved(seen, place))
