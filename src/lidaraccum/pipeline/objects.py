@@ -160,7 +160,8 @@ def _is_motion(
         and verdict.cost[0] - verdict.cost[best] > settings.margin
         and verdict.cost[best] < settings.max_cost
         and verdict.cost[best] < settings.max_share * verdict.cost[0]
-        and verdict.through[0] > settings.min_through
+        and verdict.shown[best] > settings.min_shown
+        and (verdict.through[0] > settings.min_through or verdict.shown[best] > settings.shown)
     )
 
 

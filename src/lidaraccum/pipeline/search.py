@@ -57,7 +57,8 @@ def find_objects(
         leads: Proposed movers. They must show as much as any other; those whose proposer is sure
             are asked once more, last, on less evidence.
     """
-    free = _accused(frames, settings, expected)
+    suspects = find_suspects(frames, settings)
+    free = _accused(suspects, frames, settings, expected)
     proposed = _Claimed(frames)
     for lead in leads:
         if proposed.share(lead.suspect) <= CLAIMED_SHARE:
@@ -66,7 +67,11 @@ def find_objects(
     movers = _settle(proposed.objects, free, frames, BETTER_SHARE)
     for lead in leads:
         if lead.trust >= SURE and _Claimed(frames, movers).share(lead.suspect) <= KNOWN_SHARE:
-            found = _explain_lead(lead, frames, settings.trusting(), expected)
+            trusting = settings.trusting()
+            found = _explain_lead(lead, frames, trusting, expected)
+            if found is None:  # its proposer may be right that it moves and wrong how
+                proposals = propose(lead.suspect, suspects, frames, settings)
+                found = explain(lead.suspect, proposals, frames, trusting)
             movers = (
                 _settle([_meant(found, lead, frames)], movers, frames, 1.0) if found else movers
             )
@@ -77,11 +82,13 @@ def find_objects(
 
 
 def _accused(
-    frames: Sequence[SightedFrame], settings: MotionSettings, expected: Sequence[Expectation]
+    suspects: Sequence[Suspect],
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+    expected: Sequence[Expectation],
 ) -> list[WindowObject]:
     """The movers that free space raises suspicion of."""
     claimed = _Claimed(frames)
-    suspects = find_suspects(frames, settings)
     for suspect in suspects:
         if claimed.share(suspect) > CLAIMED_SHARE:
             continue

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,10 +42,13 @@ class Verdict:
     Attributes:
         cost: Truncated distance to the nearest partner over the gate, see `MotionSettings`.
         through: Share of points without partner in places that the frame saw through.
+        shown: How much more the first hypothesis costs, summed where neither puts a point into a
+            place that is hidden from the frame: what is seen of it, not what may be.
     """
 
     cost: NDArray[np.float64]
     through: NDArray[np.float64]
+    shown: NDArray[np.float64]
 
 
 def judge(
@@ -59,8 +62,14 @@ def judge(
 
     ``turns`` (H,), radians a second, are tried with them; straight on when None.
     """
-    cost, through = judge_points(template, velocities, frames, settings, turns)
-    return Verdict(cost=cost.mean(axis=1), through=through.mean(axis=1))
+    total, passed, shown = np.zeros((3, len(velocities)))
+    others = 0
+    for cost, through, hidden in _by_frame(template, velocities, frames, settings, turns):
+        total += cost.mean(axis=1)
+        passed += through.mean(axis=1)
+        shown += np.where(hidden | hidden[0], 0.0, cost[0] - cost).mean(axis=1)
+        others += 1
+    return Verdict(cost=total / others, through=passed / others, shown=shown / others)
 
 
 def judge_points(
@@ -71,10 +80,22 @@ def judge_points(
     turns: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """As `judge`, point by point: costs (H, P) and shares of frames that saw through (H, P)."""
+    said = list(_by_frame(template, velocities, frames, settings, turns))
+    costs, passed, _ = (np.mean(part, axis=0) for part in zip(*said, strict=True))
+    return costs, passed
+
+
+def _by_frame(
+    template: Template,
+    velocities: NDArray[np.float64],
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+    turns: NDArray[np.float64] | None,
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]]:
+    """What each other frame says: costs, what it saw through, what is hidden from it, (H, P)."""
     hypotheses, count = len(velocities), len(template.world)
     turns = np.zeros(hypotheses) if turns is None else turns
     heights = np.tile(template.heights, hypotheses)
-    costs, passed = [], []
     for frame in frames:
         seconds = frame.stamp - template.stamp
         if seconds == 0:
@@ -86,13 +107,12 @@ def judge_points(
         local = as_met(moved, velocities[:, None], template.seconds, frame).reshape(-1, 3)
         gate = settings.truncation_m
         distance, _ = frame.tree.query(frame.places(local, heights), distance_upper_bound=gate)
-        through = np.isinf(distance)
+        alone = np.isinf(distance)
+        through = alone.copy()
         through[through] = frame.view.look(local[through]).through
-        alone = np.where(through, THROUGH_COST, HIDDEN_COST)
-        cost = np.where(np.isinf(distance), alone, distance / gate)
-        costs.append(cost.reshape(hypotheses, count))
-        passed.append(through.reshape(hypotheses, count))
-    return np.mean(costs, axis=0), np.mean(passed, axis=0)
+        cost = np.where(through, THROUGH_COST, np.where(alone, HIDDEN_COST, distance / gate))
+        said = cost, through, alone & ~through
+        yield tuple(part.reshape(hypotheses, count) for part in said)
 
 
 def slide_velocity(
