@@ -137,7 +137,16 @@ class SightedFrame:
 
     def world(self, picked: NDArray[np.int64]) -> NDArray[np.float64]:
         """Some of the obstacles (K,) in the world, (K, 3) metres."""
-        return rigid.transform(self.world_from_sensor, self.points[picked])
+        return self._world.take(picked, axis=0)
+
+    @cached_property
+    def _world(self) -> NDArray[np.float64]:
+        return rigid.transform(self.world_from_sensor, self.points)
+
+    @cached_property
+    def _columns(self) -> NDArray[np.float32]:
+        """The obstacles (M, 3), sensor coordinates, laid out column by column."""
+        return np.asfortranarray(self.points, dtype=np.float32)
 
     def world_at_stamp(
         self, picked: NDArray[np.int64], velocity: NDArray[np.float64]
@@ -170,6 +179,14 @@ class SightedFrame:
         nearest = np.where(about[after] - wanted < wanted - about[before], after, before)
         return np.asarray(means[nearest])
 
+    def about(self, centre: NDArray[np.float64], reach_m: float) -> NDArray[np.int64]:
+        """The obstacles (K,) in the level square so far about a place (3,) in the world."""
+        here = self.sensor_from_world[:3] @ np.append(centre, 1.0)
+        (x, y), (east, north) = self.level, here[:2]
+        near = (x > east - reach_m) & (x < east + reach_m)
+        near &= (y > north - reach_m) & (y < north + reach_m)
+        return np.flatnonzero(near)
+
     def world_of_near(self) -> NDArray[np.float64]:
         """Obstacles and low points in the world, (M + L, 3) metres."""
         return rigid.transform(self.world_from_sensor, self.near_points)
@@ -177,7 +194,7 @@ class SightedFrame:
     def watch(self, other: SightedFrame) -> None:
         """Count what this frame saw at the other frame's obstacles."""
         sensor_from_other = self.sensor_from_world @ other.world_from_sensor
-        sighting = self.view.look(rigid.transform(sensor_from_other, other.points))
+        sighting = self.view.look(other._columns, sensor_from_other)
         other.through += sighting.through
         other.met += sighting.met
 
