@@ -68,7 +68,7 @@ class RangeView:
         self._step = float(np.clip(elevation_step, FINEST_ELEVATION_STEP, COARSEST_ELEVATION_STEP))
         self._rows = int(np.pi / self._step) + 2
         self._columns = FINEST_COLUMNS
-        pixels, ranges = self._pixels(*self._seen(points, np.eye(4)))
+        pixels, ranges = self._pixels(*self._seen(points, None))
         echo = ranges > MIN_RANGE_M
         flat = np.full(self._rows * self._columns, np.inf, dtype=np.float32)
         np.minimum.at(flat, pixels[echo], ranges[echo])
@@ -92,21 +92,20 @@ class RangeView:
             points: In any coordinates; quickest column by column.
             own_from_points: (4, 4) into the frame's coordinates; they are in these when None.
         """
-        pose = np.eye(4) if own_from_points is None else own_from_points
-        pixels, ranges = self._pixels(*self._seen(points, pose))
+        pixels, ranges = self._pixels(*self._seen(points, own_from_points))
         margin = MARGIN_M + MARGIN_PER_M * ranges
         behind = self._nearest_solid.take(pixels) - ranges
         met = (np.abs(behind) <= margin) | (np.abs(self._nearest.take(pixels) - ranges) <= margin)
         return Sighting(through=(behind > margin) & ~met, met=met)
 
-    def _seen(self, points: NDArray[Any], pose: rigid.Pose) -> Columns:
+    def _seen(self, points: NDArray[Any], pose: rigid.Pose | None) -> Columns:
         """x, y, z (N,) of points (N, 3) from the viewpoint; a pose (4, 4) takes them here."""
-        shift = pose[:3, 3] - self._viewpoint
-        if (pose[:3, :3] == np.eye(3)).all():
-            x, y, z = np.ascontiguousarray((points + shift).T, dtype=np.float32)
+        if pose is None:
+            x, y, z = np.ascontiguousarray((points - self._viewpoint).T, dtype=np.float32)
             return x, y, z
         x, y, z = np.ascontiguousarray(points.T, dtype=np.float32)
-        rows = np.column_stack([pose[:3, :3], shift]).astype(np.float32)
+        rows = np.array(pose[:3], dtype=np.float32)
+        rows[:, 3] -= self._viewpoint
         x, y, z = (a * x + b * y + c * z + along for a, b, c, along in rows)
         return x, y, z
 

@@ -131,9 +131,13 @@ class SightedFrame:
             points: (N, 3) metres, sensor coordinates.
             heights: (N,) metres above the ground: hills do not part what is one thing.
         """
-        spacing = self.gap * np.hypot(points[:, 0], points[:, 1])
-        weight = np.minimum(HEIGHT_WEIGHT, BEAM_ALLOWANCE_M / np.maximum(spacing, 1e-3))
-        return np.column_stack([points[:, 0], points[:, 1], weight * heights])
+        x, y = points[:, 0], points[:, 1]
+        return np.column_stack([x, y, self.height_weight(x, y) * heights])
+
+    def height_weight(self, x: NDArray[Any], y: NDArray[Any]) -> NDArray[np.float64]:
+        """What heights count in distances, (...) each, at x and y (...), sensor coordinates."""
+        spacing = self.gap * np.sqrt(x * x + y * y)
+        return np.minimum(HEIGHT_WEIGHT, BEAM_ALLOWANCE_M / np.maximum(spacing, 1e-3))
 
     def world(self, picked: NDArray[np.int64]) -> NDArray[np.float64]:
         """Some of the obstacles (K,) in the world, (K, 3) metres."""
@@ -158,7 +162,13 @@ class SightedFrame:
         """When after the stamp the sweep passed points (N, 3), sensor coordinates: (N,) seconds."""
         if not self.is_timed:
             return np.zeros(len(points))
-        return self._seconds_by_azimuth[_azimuth_bins(points - self.viewpoint)]
+        return self.seconds_toward(points[:, 0], points[:, 1])
+
+    def seconds_toward(
+        self, x: NDArray[np.float64], y: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """As `seconds_at` where `is_timed`, for x and y (...) each: (...) seconds."""
+        return self._seconds_by_azimuth[_azimuth_bins(x - self.viewpoint[0], y - self.viewpoint[1])]
 
     @cached_property
     def is_timed(self) -> bool:
@@ -167,7 +177,8 @@ class SightedFrame:
 
     @cached_property
     def _seconds_by_azimuth(self) -> NDArray[np.float64]:
-        bins = _azimuth_bins(self.points - self.viewpoint)
+        x, y = self.level
+        bins = _azimuth_bins(x - self.viewpoint[0], y - self.viewpoint[1])
         counts = np.bincount(bins, minlength=AZIMUTH_BINS)
         sums = np.bincount(bins, self.seconds, minlength=AZIMUTH_BINS)
         full = np.flatnonzero(counts)
@@ -199,6 +210,8 @@ class SightedFrame:
         other.met += sighting.met
 
 
-def _azimuth_bins(points: NDArray[np.float64]) -> NDArray[np.int64]:
-    turns = np.arctan2(points[:, 1], points[:, 0]) / (2 * np.pi)
-    return np.asarray((turns * AZIMUTH_BINS).astype(np.int64) % AZIMUTH_BINS)
+def _azimuth_bins(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
+    angle = np.arctan2(y.astype(np.float32), x.astype(np.float32))
+    bins = (angle * np.float32(AZIMUTH_BINS / (2 * np.pi))).astype(np.int64)
+    bins[bins < 0] += AZIMUTH_BINS
+    return bins
