@@ -18,7 +18,7 @@ from lidaraccum.pipeline.verdict import (
     Verdict,
     bend_course,
     judge,
-    refine_velocity,
+    refine_velocities,
     slide_velocity,
 )
 
@@ -85,6 +85,13 @@ class WindowObject:
     turn: float = 0.0
 
 
+def stands(suspect: Suspect, frames: Sequence[SightedFrame], settings: MotionSettings) -> bool:
+    """Whether standing still explains a suspect so well that no motion could do better."""
+    rough = make_template(frames[suspect.frame], suspect.picked, FIRST_LOOK_POINTS)
+    still = judge(rough, np.zeros((1, 3)), _probes(frames), settings)
+    return bool(still.cost[0] < settings.margin)
+
+
 def explain(
     suspect: Suspect,
     proposals: NDArray[np.float64],
@@ -104,17 +111,19 @@ def explain(
     own = frames[suspect.frame]
     turns = np.zeros(len(proposals)) if turns is None else turns
     still = np.zeros((1, 3))
-    probes = frames[:: max(1, (len(frames) - 1) // (PROBES - 1))]
+    probes = _probes(frames)
     rough = make_template(own, suspect.picked, FIRST_LOOK_POINTS)
-    if len(proposals) == 0 or judge(rough, still, probes, settings).cost[0] < settings.margin:
+    if len(proposals) == 0:
         return None
-    order = np.argsort(judge(rough, proposals, probes, settings, turns).cost, kind="stable")
+    first = judge(
+        rough, np.concatenate([still, proposals]), probes, settings, np.append(0.0, turns)
+    ).cost
+    if first[0] < settings.margin:
+        return None
+    order = np.argsort(first[1:], kind="stable")
     template = make_template(own, suspect.picked, TEMPLATE_POINTS)
     chosen = order[:REFINED_HYPOTHESES]
-    refined = [
-        refine_velocity(rough, proposals[choice], probes, settings, float(turns[choice]))
-        for choice in chosen
-    ]
+    refined = refine_velocities(rough, proposals[chosen], turns[chosen], probes, settings)
     rivals = np.concatenate([still, refined])
     turning = np.concatenate([[0.0], turns[chosen]])
     verdict = judge(template, rivals, probes, settings, turning)
@@ -127,9 +136,10 @@ def explain(
         and not any(frame.registered.quality.doubts for frame in frames)
     ):
         bent, turn = bend_course(template, rivals[best], probes, settings)
-        rivals, turning = np.concatenate([rivals, bent[None]]), np.append(turning, turn)
-        verdict = judge(template, rivals, probes, settings, turning)
-        best = int(verdict.cost.argmin())
+        if turn != 0:
+            rivals, turning = np.concatenate([rivals, bent[None]]), np.append(turning, turn)
+            verdict = judge(template, rivals, probes, settings, turning)
+            best = int(verdict.cost.argmin())
     if not _is_motion(best, rivals, verdict, frames, settings):
         return None
     turn = float(turning[best])
@@ -143,6 +153,10 @@ def explain(
         margin=float(verdict.cost[0] - verdict.cost[best]),
         turn=turn,
     )
+
+
+def _probes(frames: Sequence[SightedFrame]) -> Sequence[SightedFrame]:
+    return frames[:: max(1, (len(frames) - 1) // (PROBES - 1))]
 
 
 def _is_motion(
@@ -219,12 +233,25 @@ def _touch(part: WindowObject, whole: WindowObject, frames: Sequence[SightedFram
     for frame in frames:
         if frame.index in part.picked and frame.index in whole.picked:
             some, others = part.picked[frame.index], whole.picked[frame.index]
-            if np.isin(frame.segments[some], frame.segments[others]).any():
+            clusters = np.zeros(len(frame.segment_sizes), dtype=np.bool_)
+            clusters[frame.segments[others]] = True
+            if clusters[frame.segments[some]].any():
                 return True
-            distance, _ = cKDTree(frame.points[others]).query(frame.points[some])
-            if distance.min() < SAME_GAP_M:
+            if _are_near(frame.points[some], frame.points[others]):
                 return True
     return False
+
+
+def _are_near(some: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
+    """Whether some of points (N, 3) are nearer than `SAME_GAP_M` to one of others (M, 3)."""
+    low = np.maximum(some.min(axis=0), others.min(axis=0)) - SAME_GAP_M
+    high = np.minimum(some.max(axis=0), others.max(axis=0)) + SAME_GAP_M
+    some = some[((some >= low) & (some <= high)).all(axis=1)]
+    others = others[((others >= low) & (others <= high)).all(axis=1)]
+    if len(some) == 0 or len(others) == 0:
+        return False
+    distance, _ = cKDTree(others).query(some, distance_upper_bound=SAME_GAP_M)
+    return bool(np.isfinite(distance).any())
 
 
 def _united(whole: WindowObject, part: WindowObject) -> WindowObject:

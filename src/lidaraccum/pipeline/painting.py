@@ -83,9 +83,13 @@ class Canvas:
         frame = self._frame
         if len(frame.low_rows) == 0:
             return frame.low_rows
-        low = frame.near_points[len(frame.rows) :, :2]
-        distance, _ = cKDTree(frame.points[picked, :2]).query(low, distance_upper_bound=LOW_REACH_M)
-        return frame.low_rows[np.isfinite(distance)]
+        low, own = frame.near_points[len(frame.rows) :, :2], frame.points[picked, :2]
+        least, most = own.min(axis=0) - LOW_REACH_M, own.max(axis=0) + LOW_REACH_M
+        inside = (low[:, 0] > least[0]) & (low[:, 0] < most[0])
+        inside &= (low[:, 1] > least[1]) & (low[:, 1] < most[1])
+        beside = np.flatnonzero(inside)
+        distance, _ = cKDTree(own).query(low[beside], distance_upper_bound=LOW_REACH_M)
+        return frame.low_rows[beside[np.isfinite(distance)]]
 
 
 def paint_mover(track: Track, frame: SightedFrame, canvas: Canvas, box_growth: float) -> None:
@@ -162,17 +166,26 @@ def _in_box(track: Track, frame: SightedFrame, growth: float) -> NDArray[np.int6
     """
     assert track.shape is not None
     velocity = track.velocities[frame.index]
-    own = _own_places(track.world_from_object, frame, np.arange(len(frame.rows)), velocity)
-    inside = track.shape.holds(own)
-    return np.flatnonzero(inside) if inside.sum() < growth * track.points else _NONE
+    about = _about_shape(track.shape, track.world_from_object, frame, velocity)
+    inside = track.shape.holds(_own_places(track.world_from_object, frame, about, velocity))
+    return about[inside] if inside.sum() < growth * track.points else _NONE
 
 
 def _near_shape(
     shape: ObjectShape, pose: rigid.Pose, frame: SightedFrame, velocity: NDArray[np.float64]
 ) -> NDArray[np.int64]:
     """The frame's obstacles (K,) on a shape at a pose, if it moves so."""
-    own = _own_places(pose, frame, np.arange(len(frame.rows)), velocity)
-    return np.flatnonzero(np.isfinite(shape.distances(own, FOUND_M)))
+    about = _about_shape(shape, pose, frame, velocity)
+    own = _own_places(pose, frame, about, velocity)
+    return about[np.isfinite(shape.distances(own, FOUND_M))]
+
+
+def _about_shape(
+    shape: ObjectShape, pose: rigid.Pose, frame: SightedFrame, velocity: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """The frame's obstacles (K,) that may be within reach of a shape at a pose."""
+    way = float(np.abs(frame.seconds).max(initial=0.0) * np.linalg.norm(velocity))
+    return frame.about(pose[:3, 3], shape.radius_m + FOUND_M + way)
 
 
 def _own_places(

@@ -13,7 +13,7 @@ from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.gathering import with_middle
 from lidaraccum.pipeline.hypotheses import propose
 from lidaraccum.pipeline.motion_settings import SURE, MotionSettings
-from lidaraccum.pipeline.objects import Expectation, WindowObject, explain, join_parts
+from lidaraccum.pipeline.objects import Expectation, WindowObject, explain, join_parts, stands
 from lidaraccum.pipeline.suspects import Lead, Suspect, find_suspects
 
 EXPECTED_M = 1.5
@@ -90,7 +90,7 @@ def _accused(
     """The movers that free space raises suspicion of."""
     claimed = _Claimed(frames)
     for suspect in suspects:
-        if claimed.share(suspect) > CLAIMED_SHARE:
+        if claimed.share(suspect) > CLAIMED_SHARE or stands(suspect, frames, settings):
             continue
         known = _expected_velocities(suspect, frames[suspect.frame].stamp, expected)
         found = explain(suspect, known, frames, settings) if len(known) else None

@@ -59,11 +59,22 @@ class ObjectShape:
     """All that was seen of one object, in its own coordinates (metres, z up)."""
 
     def __init__(self, points: NDArray[np.float64]) -> None:
-        self._points = points[thin(points, GRAIN_M)]
-        self._tree = cKDTree(self._points)
+        self._take(points[thin(points, GRAIN_M)])
 
     def __len__(self) -> int:
         return len(self._points)
+
+    @property
+    def radius_m(self) -> float:
+        """Nothing of it is farther from its origin, seen from above."""
+        return self._radius_m
+
+    def _take(self, points: NDArray[np.float64]) -> None:
+        self._points = points
+        self._tree = cKDTree(points)
+        self._radius_m = float(np.hypot(points[:, 0], points[:, 1]).max(initial=0.0))
+        low, high = np.quantile(points, (BOX_QUANTILE, 1 - BOX_QUANTILE), axis=0)
+        self._box = low - BOX_MARGIN_M, high + BOX_MARGIN_M
 
     def distances(self, points: NDArray[np.float64], reach_m: float) -> NDArray[np.float64]:
         """Distance (N,) from points (N, 3) to the shape's nearest; inf beyond the reach."""
@@ -72,9 +83,8 @@ class ObjectShape:
 
     def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether points (N, 3) lie in the box (N,) bool about all but the outermost of it."""
-        low, high = np.quantile(self._points, (BOX_QUANTILE, 1 - BOX_QUANTILE), axis=0)
-        inside = (points > low - BOX_MARGIN_M) & (points < high + BOX_MARGIN_M)
-        return np.asarray(inside.all(axis=1))
+        low, high = self._box
+        return np.asarray(((points > low) & (points < high)).all(axis=1))
 
     def add(self, points: NDArray[np.float64]) -> None:
         """Grow by points (N, 3); what is already there stays, so that the shape does not blur."""
@@ -82,8 +92,8 @@ class ObjectShape:
             return
         distance, _ = self._tree.query(points, distance_upper_bound=2 * GRAIN_M)
         fresh = points[distance > GRAIN_M]
-        self._points = np.concatenate([self._points, fresh[thin(fresh, GRAIN_M)]])
-        self._tree = cKDTree(self._points)
+        if len(fresh):
+            self._take(np.concatenate([self._points, fresh[thin(fresh, GRAIN_M)]]))
 
     def fit(self, points: NDArray[np.float64]) -> ShapeFit:
         """Move points (N, 3), put by prediction, onto the shape; only where that lowers the rest.
