@@ -13,7 +13,7 @@ from lidaraccum.data.registered import RegisteredFrame
 from lidaraccum.geometry import rigid
 from lidaraccum.geometry.clustering import connected_cells
 from lidaraccum.geometry.terrain import estimate_terrain
-from lidaraccum.geometry.visibility import RangeView, elevation_gap
+from lidaraccum.geometry.visibility import MIN_RANGE_M, RangeView, elevation_gap
 from lidaraccum.pipeline.motion_settings import MotionSettings
 
 HEIGHT_WEIGHT = 0.5
@@ -40,8 +40,10 @@ class SightedFrame:
         view: What its rays passed through.
         rows: (M,) int64: the obstacles' rows among the frame's points.
         low_rows: (L,) int64: rows of points lower than obstacles but above the ground.
-        near_points: (M + L, 3) float64, metres, sensor coordinates: obstacles, then low points.
-        near_heights: (M + L,) metres above the ground.
+        close_rows: (C,) int64: rows of points that stand so close that they may be the carrier.
+        near_points: (M + L + C, 3) float64, metres, sensor coordinates: obstacles, low points, then
+            close ones.
+        near_heights: (M + L + C,) metres above the ground.
         seconds: (M,) after the stamp, when each obstacle was met; 0 where nothing tells.
         segments: (M,) int64: each obstacle's cluster within this frame.
         segment_sizes: (S,) obstacles in each cluster.
@@ -65,14 +67,19 @@ class SightedFrame:
         self.gap = elevation_gap(rays)
         self.view = RangeView(points, self.gap, self.viewpoint)
         heights = estimate_terrain(points).height_above(points)
-        outside = np.einsum("ij,ij->i", rays, rays) > settings.min_range_m**2
-        standing = outside & (heights < settings.max_height_m)
+        squared = np.einsum("ij,ij->i", rays, rays)
+        outside = squared > settings.min_range_m**2
+        low_enough = heights < settings.max_height_m
+        standing = outside & low_enough
         obstacle = heights >= settings.min_height_m
         self.rows = np.flatnonzero(standing & obstacle)
         self.low_rows = np.flatnonzero(
             standing & ~obstacle & (heights > LOW_SHARE * settings.min_height_m)
         )
-        near = np.concatenate([self.rows, self.low_rows])
+        self.close_rows = np.flatnonzero(
+            ~outside & low_enough & obstacle & (squared > MIN_RANGE_M**2)
+        )
+        near = np.concatenate([self.rows, self.low_rows, self.close_rows])
         self.near_points = points[near].astype(np.float64)
         self.near_heights = heights[near]
         seconds = registered.seconds_within_sweep
@@ -114,7 +121,7 @@ class SightedFrame:
 
     @cached_property
     def tree(self) -> cKDTree:
-        """Obstacles and low points by `places`."""
+        """Obstacles, low and close points by `places`."""
         places = self.places(self.near_points, self.near_heights)
         return cKDTree(places, balanced_tree=False, compact_nodes=False)
 
@@ -200,7 +207,18 @@ class SightedFrame:
 
     def world_of_near(self) -> NDArray[np.float64]:
         """Obstacles and low points in the world, (M + L, 3) metres."""
-        return rigid.transform(self.world_from_sensor, self.near_points)
+        points = self.near_points[: len(self.rows) + len(self.low_rows)]
+        return rigid.transform(self.world_from_sensor, points)
+
+    @property
+    def low_points(self) -> NDArray[np.float64]:
+        """(L, 3) the low points, metres, sensor coordinates."""
+        return self.near_points[len(self.rows) :][: len(self.low_rows)]
+
+    @property
+    def close_points(self) -> NDArray[np.float64]:
+        """(C, 3) the close points, metres, sensor coordinates."""
+        return self.near_points[len(self.rows) + len(self.low_rows) :]
 
     def watch(self, other: SightedFrame) -> None:
         """Count what this frame saw at the other frame's obstacles."""

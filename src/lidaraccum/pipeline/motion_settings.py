@@ -13,8 +13,8 @@ TRUSTED_SHARE = 0.85
 TRUSTED_WAY = 0.5
 TRUSTED_SHOWN = 0.08
 """Where a proposer is so sure that something moves, this share of the margin is enough and this
-cost is allowed if it is less than this share of standing still; so is this share of the way. So much
-of it must be shown, not hidden: a wall that comes into view may have come from anywhere."""
+cost is allowed if it is less than this share of standing still; so is this share of the way. So
+much of it must be shown, not hidden: a wall that comes into view may have come from anywhere."""
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,15 @@ this share of the margin by it; nor is anything where a pose is doubtful: turns 
 PROBES = 5
 """So many of a longer window's frames, evenly over it, are asked for their verdict."""
 
+ABOUT_M = 10.0
+GOES_ALONG = 0.03
+"""What stands so near to something that nobody saw through must not go along with it: not by so much
+less cost than standing."""
+
+AS_SENSOR_MPS = 0.5
+AS_SENSOR_SHARE = 0.25
+"""Velocities nearer than this, and this share of its speed, are the sensor's own."""
+
 SAME_GAP_M = 0.8
 SAME_SPEED_MPS = 0.8
 """Two movers nearer than this and with velocities as like as this are one."""
@@ -143,6 +152,9 @@ def explain(
     if not _is_motion(best, rivals, verdict, frames, settings):
         return None
     turn = float(turning[best])
+    unseen = verdict.through[0] <= settings.min_through or verdict.through[0] == 0
+    if unseen and _all_goes_along(suspect, rivals[best], turn, frames, settings):
+        return None
     velocity = slide_velocity(template, rivals[best], probes, settings, turn)
     picked = gather(suspect, velocity, frames, settings, turn)
     return WindowObject(
@@ -153,6 +165,29 @@ def explain(
         margin=float(verdict.cost[0] - verdict.cost[best]),
         turn=turn,
     )
+
+
+def _all_goes_along(
+    suspect: Suspect,
+    velocity: NDArray[np.float64],
+    turn: float,
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+) -> bool:
+    """Whether a motion suits what stands about a suspect, too: then a pose is wrong, no mover there.
+
+    Nothing that others saw through is asked, so that those who go with it have no say.
+    """
+    own = frames[suspect.frame]
+    about = own.about(suspect.centre, ABOUT_M)
+    stands = (own.met[about] > 0) & (own.through[about] == 0)
+    about = about[stands & ~np.isin(own.segments[about], own.segments[suspect.picked])]
+    if len(about) < TEMPLATE_POINTS:
+        return False
+    template = make_template(own, about, TEMPLATE_POINTS)
+    rivals, turns = np.stack([np.zeros(3), velocity]), np.array([0.0, turn])
+    verdict = judge(template, rivals, _probes(frames), settings, turns)
+    return bool(verdict.shown[1] > GOES_ALONG)
 
 
 def _probes(frames: Sequence[SightedFrame]) -> Sequence[SightedFrame]:
@@ -175,8 +210,19 @@ def _is_motion(
         and verdict.cost[best] < settings.max_cost
         and verdict.cost[best] < settings.max_share * verdict.cost[0]
         and verdict.shown[best] > settings.min_shown
-        and (verdict.through[0] > settings.min_through or verdict.shown[best] > settings.shown)
+        and (
+            verdict.through[0] > settings.min_through
+            or (verdict.shown[best] > settings.shown and not _goes_as_sensor(rivals[best], frames))
+        )
     )
+
+
+def _goes_as_sensor(velocity: NDArray[np.float64], frames: Sequence[SightedFrame]) -> bool:
+    """Whether it is the sensor's own motion: where beams meet a rail travels along with them."""
+    first, last = frames[0], frames[-1]
+    way = last.world_from_sensor[:3, 3] - first.world_from_sensor[:3, 3]
+    sensor = way / (last.stamp - first.stamp) * (1.0, 1.0, 0.0)
+    return are_alike(sensor, velocity, AS_SENSOR_MPS, AS_SENSOR_SHARE)
 
 
 def join_parts(

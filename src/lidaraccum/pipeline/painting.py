@@ -48,13 +48,30 @@ class Canvas:
 
     def paint(self, track: Track, picked: NDArray[np.int64], label: int) -> None:
         """Give obstacles (K,), and what is low beside them, to an object."""
-        rows = np.concatenate([self._frame.rows[picked], self._low_beside(picked)])
+        self._paint_rows(
+            track, np.concatenate([self._frame.rows[picked], self._low_beside(picked)]), label
+        )
+
+    def _paint_rows(self, track: Track, rows: NDArray[np.int64], label: int) -> None:
         rows = rows[self._instance[rows] == 0]
         self._label[rows] = label
         self._instance[rows] = track.instance
         self._confidence[rows] = min(1.0, 0.5 + 0.5 * track.margin)
         if label == MOVING:
             self._poses[track.instance] = track.world_from_object
+
+    def paint_close(self, track: Track) -> None:
+        """Give a mover what is on its shape and so close that it might be the carrier's."""
+        close = self._frame.close_points
+        if len(close) == 0 or track.shape is None:
+            return
+        velocity = track.velocities[self._frame.index]
+        seconds = self._frame.seconds_at(close)
+        world = rigid.transform(self._frame.world_from_sensor, close) - seconds[:, None] * velocity
+        own = rigid.transform(rigid.invert(track.world_from_object), world)
+        on = track.shape.holds(own) & np.isfinite(track.shape.distances(own, FOUND_M))
+        self._paint_rows(track, self._frame.close_rows[on], MOVING)
+        track.shape.add(own[on])
 
     def paint_still(
         self, rows: NDArray[np.int64], instance: int, confidence: NDArray[np.float32]
@@ -83,7 +100,7 @@ class Canvas:
         frame = self._frame
         if len(frame.low_rows) == 0:
             return frame.low_rows
-        low, own = frame.near_points[len(frame.rows) :, :2], frame.points[picked, :2]
+        low, own = frame.low_points[:, :2], frame.points[picked, :2]
         least, most = own.min(axis=0) - LOW_REACH_M, own.max(axis=0) + LOW_REACH_M
         inside = (low[:, 0] > least[0]) & (low[:, 0] < most[0])
         inside &= (low[:, 1] > least[1]) & (low[:, 1] < most[1])
@@ -100,6 +117,7 @@ def paint_mover(track: Track, frame: SightedFrame, canvas: Canvas, box_growth: f
         canvas.paint(
             track, np.union1d(picked, canvas.free(_in_box(track, frame, box_growth))), MOVING
         )
+        canvas.paint_close(track)
         return
     if track.shape is None or frame.index - track.last_index > LOST_FRAMES:
         return
