@@ -30,9 +30,11 @@ BENDS = (0.1, 0.2, 0.4, 0.8, -0.1, -0.2, -0.4, -0.8)
 BENDS_REFINED = 2
 FINER = (0.75, 1.25)
 WORTH_BENDING = 0.05
+BENDING_SAVES = 0.15
 """Turns over the window, radians, that are tried on what no straight course explains, how many of
 them are refined, shares of the best that are tried then, and how much less one must cost than going
-straight."""
+straight. None is refined where all cost more than that before, or so much more than any motion
+may."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +131,8 @@ def bend_course(
     turns = np.array((0.0, *BENDS)) / max(max(stamps) - min(stamps), 1e-6)
     costs = judge(template, np.tile(velocity, (len(turns), 1)), frames, settings, turns).cost
     best, cost = (velocity, 0.0), float(costs[0]) - WORTH_BENDING
+    if costs[1:].min() > min(float(costs[0]), settings.max_cost + BENDING_SAVES):
+        return best
     tried = turns[1:][np.argsort(costs[1:], kind="stable")[:BENDS_REFINED]]
     for _ in range(2):
         starts = np.tile(best[0], (len(tried), 1))
@@ -184,6 +188,7 @@ def refine_velocities(
     turns: NDArray[np.float64],
     frames: Sequence[SightedFrame],
     settings: MotionSettings,
+    steps: int = REFINING_STEPS,
 ) -> NDArray[np.float64]:
     """Velocities (H, 3) that best take a cluster onto all other frames together, from H starts.
 
@@ -191,7 +196,7 @@ def refine_velocities(
     and its distance in time are its weight. ``turns`` (H,), radians a second, stay as they are.
     """
     refined = velocities.copy()
-    for _ in range(REFINING_STEPS):
+    for _ in range(steps):
         asked, weight = np.zeros((2, len(refined))), np.zeros(len(refined))
         for frame in frames:
             seconds = frame.stamp - template.stamp
