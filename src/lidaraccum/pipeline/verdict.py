@@ -222,6 +222,8 @@ def _asked_shifts(
     local = land(template, velocities, turns, frame)
     distance, partner = nearest(local, template.heights, frame, 2 * settings.truncation_m)
     hit = np.isfinite(distance)
+    if not hit.any():
+        return np.zeros(len(turns), dtype=np.int64), np.zeros((3, len(turns)))
     trust = np.where(hit, 1 / (0.1 + distance), 0.0)
     lag = frame.near_points.take(partner, axis=0, mode="clip").transpose(2, 0, 1) - local
     shift = (lag * trust).sum(axis=2) / np.maximum(trust.sum(axis=1), 1e-9)
