@@ -173,11 +173,11 @@ def elevation_gap(points: NDArray[Any]) -> float:
     """
     fine = np.deg2rad(0.2)
     x, y, z = np.ascontiguousarray(points.T, dtype=np.float32)
-    elevation = np.arctan2(z, np.hypot(x, y))
-    column = ((np.arctan2(y, x) + np.float32(np.pi)) * (180 / np.pi)).astype(np.int64)
-    row = ((elevation + np.float32(np.pi / 2)) / fine).astype(np.int64)
+    elevation = np.arctan2(z, np.hypot(x, y)) + np.float32(np.pi / 2)
+    column = ((np.arctan2(y, x) + np.float32(np.pi)) * np.float32(180 / np.pi)).astype(np.int32)
+    row = (elevation / fine).astype(np.int32)
     seen = np.zeros((361, int(np.pi / fine) + 2), dtype=np.bool_)
-    seen[column, row] = True
+    seen.ravel()[(column * np.int32(seen.shape[1]) + row).astype(np.int64)] = True
     counts = seen.sum(axis=1)
     full = counts > 4
     if not full.any():

@@ -58,12 +58,13 @@ class SightedFrame:
         viewpoint: NDArray[np.float64] | None = None,
     ) -> None:
         points = registered.frame.points
-        beyond = np.abs(points).max(axis=1) > FARTHEST_ECHO_M
-        # What no sensor can have seen counts as no return: it would stretch every grid.
-        points = np.where(beyond[:, None], np.float32(0), points) if beyond.any() else points
+        if np.abs(points).max(initial=0.0) > FARTHEST_ECHO_M:
+            # What no sensor can have seen counts as no return: it would stretch every grid.
+            beyond = np.abs(points).max(axis=1) > FARTHEST_ECHO_M
+            points = np.where(beyond[:, None], np.float32(0), points)
         self.registered = registered
         self.viewpoint = np.zeros(3) if viewpoint is None else viewpoint
-        rays = points - self.viewpoint
+        rays = points - self.viewpoint.astype(np.float32)
         self.gap = elevation_gap(rays)
         self.view = RangeView(points, self.gap, self.viewpoint)
         heights = estimate_terrain(points).height_above(points)
@@ -171,9 +172,7 @@ class SightedFrame:
             return np.zeros(len(points))
         return self.seconds_toward(points[:, 0], points[:, 1])
 
-    def seconds_toward(
-        self, x: NDArray[np.float64], y: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def seconds_toward(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
         """As `seconds_at` where `is_timed`, for x and y (...) each: (...) seconds."""
         return self._seconds_by_azimuth[_azimuth_bins(x - self.viewpoint[0], y - self.viewpoint[1])]
 

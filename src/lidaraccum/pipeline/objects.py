@@ -30,6 +30,11 @@ WORTH_A_BEND = 0.3
 """What costs less on a straight course is not asked whether it turns, nor is what saves less than
 this share of the margin by it; nor is anything where a pose is doubtful: turns explain slips."""
 
+FIRST_MARGIN = 1 / 3
+REFINING_SAVES = 0.3
+"""Motions are given up that after one step of refining save less than this share of the margin or
+cost so much more than a motion may."""
+
 PROBES = 5
 """So many of a longer window's frames, evenly over it, are asked for their verdict."""
 
@@ -129,12 +134,17 @@ def explain(
     ).cost
     if first[0] < settings.margin:
         return None
-    order = np.argsort(first[1:], kind="stable")
+    chosen = np.argsort(first[1:], kind="stable")[:REFINED_HYPOTHESES]
+    refined, turns = proposals[chosen], turns[chosen]
+    if not _is_promising(first[1:].min(), first[0], settings):
+        refined = refine_velocities(rough, refined, turns, probes, settings, steps=1)
+        second = judge(rough, refined, probes, settings, turns).cost
+        if not _is_promising(second.min(), first[0], settings):
+            return None
+    refined = refine_velocities(rough, refined, turns, probes, settings)
     template = make_template(own, suspect.picked, TEMPLATE_POINTS)
-    chosen = order[:REFINED_HYPOTHESES]
-    refined = refine_velocities(rough, proposals[chosen], turns[chosen], probes, settings)
     rivals = np.concatenate([still, refined])
-    turning = np.concatenate([[0.0], turns[chosen]])
+    turning = np.concatenate([[0.0], turns])
     verdict = judge(template, rivals, probes, settings, turning)
     best = int(verdict.cost.argmin())
     saved = float(verdict.cost[0] - verdict.cost[best])
@@ -188,6 +198,12 @@ def _all_goes_along(
     rivals, turns = np.stack([np.zeros(3), velocity]), np.array([0.0, turn])
     verdict = judge(template, rivals, _probes(frames), settings, turns)
     return bool(verdict.shown[1] > GOES_ALONG)
+
+
+def _is_promising(cost: float, standing: float, settings: MotionSettings) -> bool:
+    """Whether a motion that costs so much at first sight may, refined, be one after all."""
+    saved = standing - cost
+    return saved > FIRST_MARGIN * settings.margin and cost < settings.max_cost + REFINING_SAVES
 
 
 def _probes(frames: Sequence[SightedFrame]) -> Sequence[SightedFrame]:

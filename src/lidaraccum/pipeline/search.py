@@ -160,7 +160,7 @@ def _saved(one: WindowObject) -> float:
 
 def _overlap(one: WindowObject, other: WindowObject) -> bool:
     return any(
-        len(np.intersect1d(picked, other.picked[index]))
+        len(np.intersect1d(picked, other.picked[index], assume_unique=True))
         > CLAIMED_SHARE * min(len(picked), len(other.picked[index]))
         for index, picked in one.picked.items()
         if index in other.picked

@@ -30,9 +30,11 @@ BENDS = (0.1, 0.2, 0.4, 0.8, -0.1, -0.2, -0.4, -0.8)
 BENDS_REFINED = 2
 FINER = (0.75, 1.25)
 WORTH_BENDING = 0.05
+BENDING_SAVES = 0.15
 """Turns over the window, radians, that are tried on what no straight course explains, how many of
 them are refined, shares of the best that are tried then, and how much less one must cost than going
-straight."""
+straight. None is refined where all cost more than that before, or so much more than any motion
+may."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +151,8 @@ def bend_course(
     turns = np.array((0.0, *BENDS)) / max(max(stamps) - min(stamps), 1e-6)
     costs = judge(template, np.tile(velocity, (len(turns), 1)), frames, settings, turns).cost
     best, cost = (velocity, 0.0), float(costs[0]) - WORTH_BENDING
+    if costs[1:].min() > min(float(costs[0]), settings.max_cost + BENDING_SAVES):
+        return best
     tried = turns[1:][np.argsort(costs[1:], kind="stable")[:BENDS_REFINED]]
     for _ in range(2):
         starts = np.tile(best[0], (len(tried), 1))
@@ -204,6 +208,7 @@ def refine_velocities(
     turns: NDArray[np.float64],
     frames: Sequence[SightedFrame],
     settings: MotionSettings,
+    steps: int = REFINING_STEPS,
 ) -> NDArray[np.float64]:
     """Velocities (H, 3) that best take a cluster onto all other frames together, from H starts.
 
@@ -211,7 +216,7 @@ def refine_velocities(
     and its distance in time are its weight. ``turns`` (H,), radians a second, stay as they are.
     """
     refined = velocities.copy()
-    for _ in range(REFINING_STEPS):
+    for _ in range(steps):
         asked, weight = np.zeros((2, len(refined))), np.zeros(len(refined))
         for frame in frames:
             seconds = frame.stamp - template.stamp
@@ -237,6 +242,8 @@ def _asked_shifts(
     local = land(template, velocities, turns, frame)
     distance, partner = nearest(local, template.heights, frame, 2 * settings.truncation_m)
     hit = np.isfinite(distance)
+    if not hit.any():
+        return np.zeros(len(turns), dtype=np.int64), np.zeros((3, len(turns)))
     trust = np.where(hit, 1 / (0.1 + distance), 0.0)
     lag = frame.near_points.take(partner, axis=0, mode="clip").transpose(2, 0, 1) - local
     shift = (lag * trust).sum(axis=2) / np.maximum(trust.sum(axis=1), 1e-9)
