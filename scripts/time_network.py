@@ -50,7 +50,7 @@ def main() -> None:
         timed(
             "of perceive: motion map",
             lambda: network.motion_map(
-                features.base, presence_map(features), poses, windows, tensors.stamps, 32.0
+                features.maps, presence_map(features), poses, windows, tensors.stamps, 32.0
             ),
         )
         points = some_close_points(features)

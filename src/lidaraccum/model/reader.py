@@ -83,7 +83,8 @@ class NetworkReader:
         if len(prepared.points) < FEWEST_POINTS:
             return EncodedFrame(len(frame), None)
         with torch.inference_mode(), inference():
-            return EncodedFrame(len(frame), self._network.encode(to_tensors([prepared])))
+            features = self._network.encode(to_tensors([prepared]), matchable=False)
+            return EncodedFrame(len(frame), features)
 
     def look(
         self,
