@@ -107,7 +107,7 @@ class MotionMap(nn.Module):
             half_extent_m: Half the side of the grid, metres.
         """
         times = _times(windows, stamps, presence.device)
-        warped = warp(presence.split(1), target_from_frame, windows, half_extent_m)
+        warped = warp(torch.split(presence, 1), target_from_frame, windows, half_extent_m)
         taken = nn.functional.max_pool2d(torch.cat(list(warped)), 2)[:, 0]
         halved = [
             self._halve(one, when)
@@ -188,27 +188,25 @@ def warp(
             yield one
             continue
         with exactly(one):
-            pose = target_from_frame[frame : frame + 1].float()
-            grid = _sampling_grid(pose, one.shape[2], half_extent_m)
-            moved = nn.functional.grid_sample(
-                one.float(), grid, mode="bilinear", padding_mode="zeros", align_corners=False
-            )
-        yield moved.to(one.dtype)
+            pose = target_from_frame[frame].float()
+            moved = _sample(one, _cells_there(pose, one.shape[2], half_extent_m))
+        yield moved.view(one.shape[2], one.shape[3], -1).permute(2, 0, 1)[None]
 
 
-def _sampling_grid(
-    target_from_frame: torch.Tensor, size: int, half_extent_m: float
-) -> torch.Tensor:
-    """(K, S, S, 2) where in each frame the target's cell centres lie, -1..1, y before x."""
-    rotation, shift = target_from_frame[:, :3, :3], target_from_frame[:, :3, 3:]
-    back = rotation.transpose(1, 2)
-    offset = -(back @ shift)[:, :2, 0] / half_extent_m
+def _cells_there(target_from_frame: torch.Tensor, size: int, half_extent_m: float) -> torch.Tensor:
+    """(S * S, 2) where in the frame the target's cell centres lie, in cells from the first's."""
+    rotation, shift = target_from_frame[:3, :3], target_from_frame[:3, 3:]
+    back = rotation.T
+    offset = -(back @ shift)[:2, 0] / half_extent_m
     centres = (torch.arange(size, device=shift.device) + 0.5) * (2.0 / size) - 1.0
-    x, y = centres[None, :, None], centres[None, None, :]
-    turn = back[:, :2, :2, None, None]
-    x_there = turn[:, 0, 0] * x + turn[:, 0, 1] * y + offset[:, 0, None, None]
-    y_there = turn[:, 1, 0] * x + turn[:, 1, 1] * y + offset[:, 1, None, None]
-    return torch.stack([y_there, x_there], dim=-1)
+    x, y = centres[:, None, None], centres[None, :, None]
+    there = back[:2, 0] * x + back[:2, 1] * y + offset  # (S, S, 2), -1..1
+    return _to_cells(there, size).view(-1, 2)
+
+
+def _to_cells(place: torch.Tensor, size: int) -> torch.Tensor:
+    """Places -1..1 over the grid as cells, 0 at the first one's centre."""
+    return (place + 1.0) * (0.5 * size) - 0.5
 
 
 def read(one: torch.Tensor, xy: torch.Tensor, half_extent_m: float) -> torch.Tensor:
@@ -217,17 +215,28 @@ def read(one: torch.Tensor, xy: torch.Tensor, half_extent_m: float) -> torch.Ten
     Outside the grid the nearest cell at its edge is read.
     """
     size = one.shape[2]
-    cell = ((xy / half_extent_m + 1.0) * (0.5 * size) - 0.5).clamp(0.0, size - 1.0)
-    low = cell.floor().clamp_max(size - 2.0)
-    part = (cell - low).to(one.dtype)
-    corner = low.long()
-    flat = corner[:, 0] * size + corner[:, 1]
-    rows = one.permute(0, 2, 3, 1).reshape(-1, one.shape[1])
-    px, py = part[:, :1], part[:, 1:]
-    near = torch.lerp(rows.index_select(0, flat), rows.index_select(0, flat + 1), py)
-    flat = flat + size
-    far = torch.lerp(rows.index_select(0, flat), rows.index_select(0, flat + 1), py)
-    return torch.lerp(near, far, px)
+    return _sample(one, _to_cells(xy / half_extent_m, size).clamp(0.0, size - 1.0))
+
+
+def _sample(one: torch.Tensor, cells: torch.Tensor) -> torch.Tensor:
+    """Bilinear reading (Q, C) of a map (1, C, H, H) at places (Q, 2) in cells; 0 outside.
+
+    A weighted sum of four rows each: several times faster on processors than `grid_sample`, for
+    channels lie together in memory.
+    """
+    size = one.shape[2]
+    rows = one.permute(0, 2, 3, 1).reshape(size * size, -1).float()
+    low = cells.floor()
+    corner = torch.stack([low, low + 1.0], dim=2)  # (Q, 2, 2): axis, corner
+    weight = 1.0 - (cells[:, :, None] - corner).abs()
+    weight = weight.masked_fill_((corner < 0.0) | (corner > size - 1.0), 0.0)
+    index = corner.clamp_(0.0, size - 1.0).int()
+    flat = index[:, 0, :, None] * size + index[:, 1, None, :]
+    weights = weight[:, 0, :, None] * weight[:, 1, None, :]
+    summed = nn.functional.embedding_bag(
+        flat.view(-1, 4), rows, mode="sum", per_sample_weights=weights.view(-1, 4)
+    )
+    return summed.to(one.dtype)
 
 
 class PointHead(nn.Module):

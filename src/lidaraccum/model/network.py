@@ -248,12 +248,13 @@ class Network(nn.Module):
         frame = frames.point_frame[point]
         xyz = frames.points[point]
         position = move(level[frame], xyz[:, None])[:, 0]
-        window = torch.tensor(windows.of_frame, device=device)[frame]
         seconds = torch.tensor(windows.gaps(frames.stamps), device=device).float()[frame]
         counts = torch.bincount(frame, minlength=len(frames)).tolist()
         centre = frames.pillar_centres()[frames.pillar[point]]
-        place = torch.cat(
+        told = torch.cat(
             [
+                xyz[:, :2],
+                position[:, :2],
                 (xyz[:, :2] - centre) / frames.pillar_m,
                 frames.height[point, None],
                 seconds[:, None],
@@ -261,14 +262,9 @@ class Network(nn.Module):
             dim=1,
         )
         said = [
-            self._say(one, motion_map[number : number + 1], *where, half)
-            for one, number, *where in zip(
-                base,
-                windows.of_frame,
-                xyz[:, :2].split(counts),
-                position[:, :2].split(counts),
-                place.split(counts),
-                strict=True,
+            self._say(one, motion_map[window : window + 1], own, half)
+            for one, window, own in zip(
+                base, windows.of_frame, torch.split(told, counts), strict=True
             )
         ]
         feature, foreground, dynamic, offset, own_base = map(torch.cat, zip(*said, strict=True))
@@ -278,15 +274,13 @@ class Network(nn.Module):
         )  # fmt: skip
 
     def _say(
-        self,
-        base: torch.Tensor,
-        motion_map: torch.Tensor,
-        xy: torch.Tensor,
-        aligned_xy: torch.Tensor,
-        place: torch.Tensor,
-        half_extent_m: float,
+        self, base: torch.Tensor, motion_map: torch.Tensor, told: torch.Tensor, half_extent_m: float
     ) -> tuple[torch.Tensor, ...]:
-        """What `PointHead` says of one frame's points, and the base features that they read."""
+        """What `PointHead` says of one frame's points, and the base features that they read.
+
+        A point is told (Q, 8) by x and y in its frame, x and y ego-aligned, and its `place` there.
+        """
+        xy, aligned_xy, place = torch.split(told, [2, 2, 4], dim=1)
         own = read(base, xy, half_extent_m)
         motion = read(motion_map, aligned_xy, half_extent_m)
         return (*self.point_head(motion, own, place), own)
