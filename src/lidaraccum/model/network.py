@@ -93,7 +93,8 @@ class Perception:
         dynamic: (Q,) logit: on something that does move.
         offset: (Q, 2) metres, x and y from the position to its object's centre in the target
             frame, level axes.
-        feature: (Q, D) motion features.
+        features: Motion features (q, D) of the points of each frame, apart: they are large, and few
+            are asked for again.
         base: (Q, C) base features of the point's own frame.
         seconds: (Q,) of the point's frame from the target.
     """
@@ -105,9 +106,19 @@ class Perception:
     foreground: torch.Tensor
     dynamic: torch.Tensor
     offset: torch.Tensor
-    feature: torch.Tensor
+    features: tuple[torch.Tensor, ...]
     base: torch.Tensor
     seconds: torch.Tensor
+
+    @property
+    def feature(self) -> torch.Tensor:
+        """(Q, D): the features in one tensor, a copy."""
+        return torch.cat(self.features)
+
+    def features_of(self, chosen: torch.Tensor) -> torch.Tensor:
+        """(K, D) features of the points that are chosen (Q,), in order."""
+        parts = torch.split(chosen, [len(one) for one in self.features])
+        return torch.cat([one[own] for one, own in zip(self.features, parts, strict=True)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,7 +278,8 @@ class Network(nn.Module):
                 base, windows.of_frame, torch.split(told, counts), strict=True
             )
         ]
-        feature, foreground, dynamic, offset, own_base = map(torch.cat, zip(*said, strict=True))
+        feature, *others = zip(*said, strict=True)
+        foreground, dynamic, offset, own_base = map(torch.cat, others)
         return Perception(
             windows, point, frame, position, foreground, dynamic, offset,
             feature, own_base, seconds,
@@ -310,7 +322,9 @@ class Network(nn.Module):
             target[window],
             len(ids),
         )
-        motions = self.tube_net(tubes, perception.feature[chosen], perception.base[chosen])
+        motions = self.tube_net(
+            tubes, perception.features_of(instance > 0), perception.base[chosen]
+        )
         return ObjectMotions(
             ids=ids,
             window=window,
