@@ -36,6 +36,25 @@ def test_warped_features_lie_where_the_pose_puts_them() -> None:
     torch.testing.assert_close(there, xy @ back[:2, :2].T + back[:2, 3], atol=1e-5, rtol=1e-5)
 
 
+def test_what_lies_beyond_the_grid_is_nothing() -> None:
+    pose = torch.eye(4)
+    pose[0, 3] = 2.0  # two metres ahead: a quarter of the grid
+    maps = [torch.ones(1, 3, 8, 8), torch.ones(1, 3, 8, 8)]
+    _, moved = warp(maps, torch.stack([torch.eye(4), pose]), Windows.single(2), 4.0)
+    assert (moved[:, :, :2] == 0).all()
+    torch.testing.assert_close(moved[:, :, 2:], torch.ones(1, 3, 6, 8))
+
+
+def test_maps_read_and_warped_have_gradients() -> None:
+    one = torch.rand(1, 3, 8, 8, requires_grad=True)
+    pose = torch.eye(4)
+    pose[:2, 3] = torch.tensor([0.3, -0.6])
+    _, moved = warp([one, one], torch.stack([torch.eye(4), pose]), Windows.single(2), 4.0)
+    moved[0, :, 4, 4].sum().backward()
+    assert one.grad is not None
+    torch.testing.assert_close(one.grad.sum(), torch.tensor(3.0))
+
+
 def test_the_time_a_place_was_taken_rises_along_the_way() -> None:
     """By one frame's time over one frame's way; where something stands it is the same all over."""
     taken = torch.zeros(5, 32, 32)
