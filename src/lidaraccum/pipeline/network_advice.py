@@ -105,5 +105,7 @@ class NetworkAdvice:
         self, rows: NDArray[np.int64], level: NDArray[np.float64], canvas: Canvas
     ) -> None:
         instances = canvas.instances(rows)
-        for instance in np.unique(instances[instances > 0]).tolist():
+        moving = instances > 0
+        instances, level = instances[moving], level[moving]
+        for instance in np.unique(instances).tolist():
             self._still.follow(instance, level[instances == instance])
