@@ -6,6 +6,7 @@ import torch
 
 from lidaraccum.model.kabsch import invert
 from lidaraccum.model.motion import Windows, moments, read, warp
+from lidaraccum.model.network import Network
 
 
 def ramp(size: int = 32) -> torch.Tensor:
@@ -72,3 +73,13 @@ def test_the_time_a_place_was_taken_rises_along_the_way() -> None:
     assert float(spread[10, 21]) > float(spread[5, 6])
     assert torch.equal(at_target, taken[0])
     torch.testing.assert_close(often[8:20, 20:24], torch.ones(12, 4))
+
+
+def test_time_is_mixed_as_one_convolution_would(network: Network) -> None:
+    block = network.motion_map.blocks[0]
+    stack = torch.rand(3, block.time.out_channels, 8, 8)
+    own = torch.relu(block.space(stack))
+    nothing = torch.zeros_like(own[:1])
+    three = torch.cat([torch.cat([nothing, own[:-1]]), own, torch.cat([own[1:], nothing])], dim=1)
+    expected = stack + torch.relu(block.time(three))
+    torch.testing.assert_close(torch.cat(block(stack.split(1))), expected, atol=1e-5, rtol=1e-5)
