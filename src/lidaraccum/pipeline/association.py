@@ -67,6 +67,7 @@ class Track:
     last_index: int = -1
     last_stamp: float = -np.inf
     points: int = 0
+    most_points: int = 0
 
     @property
     def expectation(self) -> Expectation:

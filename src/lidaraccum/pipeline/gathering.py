@@ -140,10 +140,12 @@ def without_standing(
     settings: MotionSettings,
     stamp: float,
     turn: float = 0.0,
+    margin: float = STANDING_MARGIN,
 ) -> dict[int, NDArray[np.int64]]:
     """The mover's points less what stands and only touches it (a parked car it passes).
 
-    Its velocity (3,) is that at ``stamp``, its rate of turn in radians a second.
+    Its velocity (3,) is that at ``stamp``, its rate of turn in radians a second. What stands costs
+    less by a ``margin``, standing; with a negative one, even what costs a little more does.
     """
     kept = {}
     for frame in frames:
@@ -159,7 +161,7 @@ def without_standing(
             )
             rivals = np.stack([np.zeros(3), turned(velocity, turn * (frame.stamp - stamp))])
             cost, _ = judge_points(template, rivals, frames, settings, np.array([0.0, turn]))
-            stands = cost[0] + STANDING_MARGIN < cost[1]
+            stands = cost[0] + margin < cost[1]
             if stands.any():
                 _, nearest = cKDTree(frame.points[sample]).query(frame.points[doubtful])
                 mine = np.setdiff1d(mine, doubtful[stands[nearest]])

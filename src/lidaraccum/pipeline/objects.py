@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from lidaraccum.pipeline.courses import are_alike, turned
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.gathering import gather, without_standing
+from lidaraccum.pipeline.gathering import STANDING_MARGIN, gather, without_standing
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.suspects import Suspect, make_template
 from lidaraccum.pipeline.verdict import (
@@ -40,8 +40,8 @@ PROBES = 5
 
 ABOUT_M = 10.0
 GOES_ALONG = 0.03
-"""What stands so near to something that nobody saw through must not go along with it: not by so much
-less cost than standing."""
+"""What stands so near to something that nobody saw through must not go along with it: not by so
+much less cost than standing."""
 
 AS_SENSOR_MPS = 0.5
 AS_SENSOR_SHARE = 0.25
@@ -89,6 +89,7 @@ class WindowObject:
         stamp: Seconds.
         margin: How much cheaper this motion is than standing still.
         turn: Radians a second, of it and of its velocity.
+        unseen: Whether too few saw through its place to tell that it moves: by its shape alone.
     """
 
     picked: Mapping[int, NDArray[np.int64]]
@@ -97,6 +98,7 @@ class WindowObject:
     stamp: float
     margin: float
     turn: float = 0.0
+    unseen: bool = False
 
 
 def stands(suspect: Suspect, frames: Sequence[SightedFrame], settings: MotionSettings) -> bool:
@@ -162,18 +164,21 @@ def explain(
     if not _is_motion(best, rivals, verdict, frames, settings):
         return None
     turn = float(turning[best])
-    unseen = verdict.through[0] <= settings.min_through or verdict.through[0] == 0
+    unseen = bool(verdict.through[0] <= max(settings.min_through, 0.0))
     if unseen and _all_goes_along(suspect, rivals[best], turn, frames, settings):
         return None
     velocity = slide_velocity(template, rivals[best], probes, settings, turn)
     picked = gather(suspect, velocity, frames, settings, turn)
+    # Where nobody saw through, what it touches and what moves as well as it stands, stands.
+    margin = -STANDING_MARGIN if unseen and settings.min_through >= 0 else STANDING_MARGIN
     return WindowObject(
-        picked=without_standing(picked, velocity, frames, settings, own.stamp, turn),
+        picked=without_standing(picked, velocity, frames, settings, own.stamp, turn, margin),
         velocity=velocity,
         centre=suspect.centre,
         stamp=own.stamp,
         margin=float(verdict.cost[0] - verdict.cost[best]),
         turn=turn,
+        unseen=unseen,
     )
 
 
@@ -184,7 +189,7 @@ def _all_goes_along(
     frames: Sequence[SightedFrame],
     settings: MotionSettings,
 ) -> bool:
-    """Whether a motion suits what stands about a suspect, too: then a pose is wrong, no mover there.
+    """Whether a motion suits what stands about a suspect, too: then it is a pose that is wrong.
 
     Nothing that others saw through is asked, so that those who go with it have no say.
     """

@@ -70,8 +70,9 @@ class Canvas:
         world = rigid.transform(self._frame.world_from_sensor, close) - seconds[:, None] * velocity
         own = rigid.transform(rigid.invert(track.world_from_object), world)
         on = track.shape.holds(own) & np.isfinite(track.shape.distances(own, FOUND_M))
-        self._paint_rows(track, self._frame.close_rows[on], MOVING)
-        track.shape.add(own[on])
+        if on.sum() < FOUND_GROWTH * track.most_points:
+            self._paint_rows(track, self._frame.close_rows[on], MOVING)
+            track.shape.add(own[on])
 
     def paint_still(
         self, rows: NDArray[np.int64], instance: int, confidence: NDArray[np.float32]
@@ -175,6 +176,7 @@ def _note(track: Track, frame: SightedFrame, pose: rigid.Pose, points: int) -> N
     track.world_from_object = pose
     track.last_index, track.last_stamp = frame.index, frame.stamp
     track.points = points
+    track.most_points = max(track.most_points, points)
 
 
 def _in_box(track: Track, frame: SightedFrame, growth: float) -> NDArray[np.int64]:

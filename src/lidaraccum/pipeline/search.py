@@ -87,8 +87,9 @@ def _accused(
     settings: MotionSettings,
     expected: Sequence[Expectation],
 ) -> list[WindowObject]:
-    """The movers that free space raises suspicion of."""
+    """The movers that free space raises suspicion of; those it says least of come last."""
     claimed = _Claimed(frames)
+    unseen: list[tuple[Suspect, WindowObject]] = []
     for suspect in suspects:
         if claimed.share(suspect) > CLAIMED_SHARE or stands(suspect, frames, settings):
             continue
@@ -97,7 +98,13 @@ def _accused(
         if found is None:
             proposals = propose(suspect, suspects, frames, settings)
             found = explain(suspect, proposals, frames, settings)
-        claimed.add(found)
+        if found is not None and found.unseen:
+            unseen.append((suspect, found))
+        else:
+            claimed.add(found)
+    for suspect, found in unseen:
+        if claimed.share(suspect) <= CLAIMED_SHARE:
+            claimed.add(found)
     return claimed.objects
 
 
