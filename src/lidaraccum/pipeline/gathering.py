@@ -176,11 +176,12 @@ def with_middle(
     frames: Sequence[SightedFrame],
     stamp: float,
     turn: float,
+    most_growth: float = np.inf,
 ) -> dict[int, NDArray[np.int64]]:
     """A mover's points and what lies between them in their clusters, unless it is seen to stand.
 
     A long side that slides along itself is seen through at its ends only. What stands is seen there
-    when the mover is elsewhere.
+    when the mover is elsewhere. Nothing is added that has ``most_growth`` times its points.
     """
     shown = [frame for frame in frames if len(picked.get(frame.index, ()))]
     boxes = {}
@@ -194,7 +195,7 @@ def with_middle(
         world = frame.world(near)
         inside = boxes[frame.index].holds(world, 0.0)
         near, world = near[inside], world[inside]
-        if len(near) == 0:
+        if not 0 < len(near) < most_growth * len(mine):
             continue
         balance = 0
         for other in shown:

@@ -161,7 +161,7 @@ def explain(
             rivals, turning = np.concatenate([rivals, bent[None]]), np.append(turning, turn)
             verdict = judge(template, rivals, probes, settings, turning)
             best = int(verdict.cost.argmin())
-    if not _is_motion(best, rivals, verdict, frames, settings):
+    if not _is_motion(suspect, best, rivals, verdict, frames, settings):
         return None
     turn = float(turning[best])
     unseen = bool(verdict.through[0] <= max(settings.min_through, 0.0))
@@ -216,6 +216,7 @@ def _probes(frames: Sequence[SightedFrame]) -> Sequence[SightedFrame]:
 
 
 def _is_motion(
+    suspect: Suspect,
     best: int,
     rivals: NDArray[np.float64],
     verdict: Verdict,
@@ -233,17 +234,30 @@ def _is_motion(
         and verdict.shown[best] > settings.min_shown
         and (
             verdict.through[0] > settings.min_through
-            or (verdict.shown[best] > settings.shown and not _goes_as_sensor(rivals[best], frames))
+            or (
+                verdict.shown[best] > settings.shown
+                and not _goes_as_sensor(suspect, rivals[best], frames)
+            )
         )
     )
 
 
-def _goes_as_sensor(velocity: NDArray[np.float64], frames: Sequence[SightedFrame]) -> bool:
-    """Whether it is the sensor's own motion: where beams meet a rail travels along with them."""
-    first, last = frames[0], frames[-1]
-    way = last.world_from_sensor[:3, 3] - first.world_from_sensor[:3, 3]
-    sensor = way / (last.stamp - first.stamp) * (1.0, 1.0, 0.0)
-    return are_alike(sensor, velocity, AS_SENSOR_MPS, AS_SENSOR_SHARE)
+def _goes_as_sensor(
+    suspect: Suspect, velocity: NDArray[np.float64], frames: Sequence[SightedFrame]
+) -> bool:
+    """Whether its speed is the sensor's own that way: where beams meet a rail goes along with them.
+
+    Args:
+        suspect: Points of one frame.
+        velocity: (3,) m/s, world, that seems to be theirs.
+        frames: The window.
+    """
+    before = frames[max(suspect.frame - 1, 0)]
+    after = frames[min(suspect.frame + 1, len(frames) - 1)]
+    way = after.world_from_sensor[:3, 3] - before.world_from_sensor[:3, 3]
+    speed = float(np.linalg.norm(velocity))
+    sensor_mps = float(way @ velocity) / speed / (after.stamp - before.stamp)
+    return abs(sensor_mps - speed) < AS_SENSOR_MPS + AS_SENSOR_SHARE * speed
 
 
 def join_parts(

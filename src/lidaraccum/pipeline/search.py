@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lidaraccum.pipeline.courses import are_alike
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.gathering import with_middle
+from lidaraccum.pipeline.gathering import WHOLE_GROWTH, with_middle
 from lidaraccum.pipeline.hypotheses import propose
 from lidaraccum.pipeline.motion_settings import SURE, MotionSettings
 from lidaraccum.pipeline.objects import Expectation, WindowObject, explain, join_parts, stands
@@ -75,10 +75,13 @@ def find_objects(
             movers = (
                 _settle([_meant(found, lead, frames)], movers, frames, 1.0) if found else movers
             )
-    return [
-        replace(one, picked=with_middle(one.picked, one.velocity, frames, one.stamp, one.turn))
-        for one in join_parts(movers, frames, settings)
-    ]
+    return [_filled(one, frames) for one in join_parts(movers, frames, settings)]
+
+
+def _filled(one: WindowObject, frames: Sequence[SightedFrame]) -> WindowObject:
+    most_growth = WHOLE_GROWTH if one.unseen else np.inf
+    picked = with_middle(one.picked, one.velocity, frames, one.stamp, one.turn, most_growth)
+    return replace(one, picked=picked)
 
 
 def _accused(
