@@ -41,9 +41,9 @@ class SightedFrame:
         rows: (M,) int64: the obstacles' rows among the frame's points.
         low_rows: (L,) int64: rows of points lower than obstacles but above the ground.
         close_rows: (C,) int64: rows of points that stand so close that they may be the carrier.
-        near_points: (M + L + C, 3) float64, metres, sensor coordinates: obstacles, low points, then
-            close ones.
-        near_heights: (M + L + C,) metres above the ground.
+        near_points: (M + L, 3) float64, metres, sensor coordinates: obstacles, then low points.
+        near_heights: (M + L,) metres above the ground.
+        close_points: (C, 3) float64, metres, sensor coordinates.
         seconds: (M,) after the stamp, when each obstacle was met; 0 where nothing tells.
         segments: (M,) int64: each obstacle's cluster within this frame.
         segment_sizes: (S,) obstacles in each cluster.
@@ -80,7 +80,8 @@ class SightedFrame:
         self.close_rows = np.flatnonzero(
             ~outside & low_enough & obstacle & (squared > MIN_RANGE_M**2)
         )
-        near = np.concatenate([self.rows, self.low_rows, self.close_rows])
+        self.close_points = points[self.close_rows].astype(np.float64)
+        near = np.concatenate([self.rows, self.low_rows])
         self.near_points = points[near].astype(np.float64)
         self.near_heights = heights[near]
         seconds = registered.seconds_within_sweep
@@ -122,7 +123,7 @@ class SightedFrame:
 
     @cached_property
     def tree(self) -> cKDTree:
-        """Obstacles, low and close points by `places`."""
+        """Obstacles and low points by `places`."""
         places = self.places(self.near_points, self.near_heights)
         return cKDTree(places, balanced_tree=False, compact_nodes=False)
 
@@ -206,18 +207,12 @@ class SightedFrame:
 
     def world_of_near(self) -> NDArray[np.float64]:
         """Obstacles and low points in the world, (M + L, 3) metres."""
-        points = self.near_points[: len(self.rows) + len(self.low_rows)]
-        return rigid.transform(self.world_from_sensor, points)
+        return rigid.transform(self.world_from_sensor, self.near_points)
 
     @property
     def low_points(self) -> NDArray[np.float64]:
         """(L, 3) the low points, metres, sensor coordinates."""
-        return self.near_points[len(self.rows) :][: len(self.low_rows)]
-
-    @property
-    def close_points(self) -> NDArray[np.float64]:
-        """(C, 3) the close points, metres, sensor coordinates."""
-        return self.near_points[len(self.rows) + len(self.low_rows) :]
+        return self.near_points[len(self.rows) :]
 
     def watch(self, other: SightedFrame) -> None:
         """Count what this frame saw at the other frame's obstacles."""
