@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,14 +11,16 @@ from numpy.typing import NDArray
 from lidaraccum.data.frame import BoolArray, Frame
 from lidaraccum.data.registered import RegisteredFrame, RegistrationQuality
 from lidaraccum.geometry import rigid
+from lidaraccum.registration.along import COARSE_POINTS, FAIR, SURE, open_axis, slide
 from lidaraccum.registration.deskew import SweepClock
-from lidaraccum.registration.icp import assess
+from lidaraccum.registration.icp import align, assess
 from lidaraccum.registration.locate import Hypothesis, Located, proposed, refine, search
 from lidaraccum.registration.pace import Pace
 from lidaraccum.registration.proposals import Reach
 from lidaraccum.registration.quality import Judge
 from lidaraccum.registration.scan import Scan, prepare
 from lidaraccum.registration.settings import RegistrationSettings
+from lidaraccum.registration.sightlines import Eye, Sight
 from lidaraccum.registration.surface_map import SurfaceMap
 
 MAX_ACCELERATION = 8.0
@@ -31,6 +34,9 @@ SAME_TWIST_M, SAME_TWIST_RAD = 0.02, 0.0005
 
 MAX_PASSES = 3
 MAX_REACH_M = 60.0
+
+SIGHTS = 4
+"""Frames whose sight lines the next one is compared with where planes leave a direction open."""
 
 PATIENCE = 3
 """Frames in a row that may be left out of the map as lost before the map starts anew."""
@@ -92,6 +98,11 @@ class Tracker:
         self._last: Fix | None = None
         self._first_origin = np.zeros(3)
         self._lost = 0
+        self._eye = Eye()
+        self.sights: deque[Sight] = deque(maxlen=SIGHTS + 1)
+        self.open_axes: list[NDArray[np.float64]] = []
+        self.slides = False
+        self._is_open = False
 
     def start(self, index: int, raw: Frame, usable: BoolArray, pose: rigid.Pose) -> RegisteredFrame:
         """Put the first frame on the empty map."""
@@ -116,6 +127,26 @@ class Tracker:
             quality = replace(quality, doubts=(*quality.doubts, contradiction))
         return self._remember(scan, self.twist, pose, quality)
 
+    def ride(
+        self,
+        index: int,
+        raw: Frame,
+        usable: BoolArray,
+        pose: rigid.Pose,
+        rail: NDArray[np.float64],
+    ) -> RegisteredFrame:
+        """Put a frame at a pose, as planes have it but for its place along a rail (3,), world."""
+        steps = self._steps_to(index, raw)
+        scan = self._prepare(index, raw, usable)
+        source = scan.source(self._twist_to(pose, steps))
+        placed = align(self._surface, source, pose, rail=rail)
+        located = Located("steady", assess(self._surface, source, placed), sighted=True)
+        self._is_open = True
+        self.open_axes.append(rail)
+        self.twist = self._twist_to(placed, steps)
+        quality = self._judge.judge(located, self._speed(placed, steps))
+        return self._remember(scan, self.twist, placed, quality)
+
     def follow(
         self, index: int, raw: Frame, usable: BoolArray, hints: tuple[Hypothesis, ...] = ()
     ) -> RegisteredFrame:
@@ -138,6 +169,7 @@ class Tracker:
             twist = found
             again = refine(self._surface, scan.source(twist), _start_of(located))
             located = replace(located, alignment=again.alignment)
+        located = self._slid(scan, located, expectation)
         return self._conclude(scan, located, expectation)
 
     def _expect(self, index: int, raw: Frame, hints: tuple[Hypothesis, ...]) -> Expectation:
@@ -160,6 +192,8 @@ class Tracker:
         first, found = expectation.starts[0], None
         if expectation.known:
             found = refine(self._surface, source, first)
+            if self.slides and self._is_open:
+                return found
             if self._judge.trusts(found) and self._is_smooth(found, first, expectation.steps):
                 return found
         interval_s = expectation.steps * self._pace.interval_s
@@ -171,6 +205,37 @@ class Tracker:
         axes = (2,) if expectation.known else (2, 0, 1)
         shifts = proposed(self._surface, source, first.world_from_sensor, reach, axes)
         return search(self._surface, source, [*expectation.starts, *shifts], found)
+
+    def _slid(self, scan: Scan, located: Located, expectation: Expectation) -> Located:
+        """Where planes leave a direction open, the place along it that sight lines prefer."""
+        pose = located.alignment.world_from_sensor
+        twist = self._twist_to(pose, expectation.steps)
+        source = scan.source(twist)
+        axis = open_axis(self._surface, source, pose)
+        self._is_open = axis is not None
+        if axis is None or scan.raw.origin.any():
+            return located
+        self.open_axes.append(axis)
+        if not self.slides or not expectation.known:
+            return located
+        expected = expectation.starts[0].world_from_sensor
+        on_rail = align(self._surface, source, expected, rail=axis)
+        interval_s = expectation.steps * self._pace.interval_s
+        reach_m = SMOOTH_M + 0.5 * MAX_ACCELERATION * interval_s**2
+        sight = self._sight(scan, scan.straightened(twist), twist, pose)
+        found = slide(list(self.sights)[-SIGHTS:], sight, on_rail, axis, reach_m)
+        away_m = abs(float((pose - on_rail)[:3, 3] @ axis))
+        if found.gain > (FAIR if away_m < reach_m else -SURE):
+            alignment = assess(self._surface, source, found.world_from_sensor)
+            located = replace(located, alignment=alignment)
+        return replace(located, adrift=found.clear < SURE, sighted=found.clear >= SURE)
+
+    def _sight(
+        self, scan: Scan, frame: Frame, twist: NDArray[np.float64], pose: rigid.Pose
+    ) -> Sight:
+        source = scan.source(twist)
+        few = source[:: max(1, len(source) // COARSE_POINTS)]
+        return Sight(frame, scan.usable, few, pose, self._eye)
 
     def _is_smooth(self, found: Located, start: Hypothesis, steps: float) -> bool:
         interval_s = steps * self._pace.interval_s
@@ -205,6 +270,7 @@ class Tracker:
     ) -> RegisteredFrame:
         frame = scan.straightened(twist)
         self._surface.insert(rigid.transform(pose, frame.points[scan.usable]), scan.index)
+        self.sights.append(self._sight(scan, frame, twist, pose))
         self._surface.forget_far(pose[:3, 3], scan.index)
         self._last = Fix(scan.index, frame.stamp, pose)
         return self._registered(scan, frame, pose, quality)
