@@ -29,9 +29,6 @@ open. In streets it is 0.04 to 0.2; in tunnels where rings alone spoke for stand
 SURE = 3.0
 """Standard deviations by which sight lines must prefer a motion to be believed against planes."""
 
-FAIR = 1.5
-"""The same where both are as likely."""
-
 APART_M = 0.3
 """Motions differ, along the way, from here on."""
 
@@ -142,57 +139,3 @@ class SteadyMotion:
         share = (place - places[after - 1]) / (places[after] - places[after - 1])
         twists = rails[after - 1] + share * (rails[after] - rails[after - 1])
         return [rigid.exponential(twist) for twist in twists]
-
-
-@dataclass(frozen=True, eq=False)
-class Slide:
-    """Where along an open direction a frame lies by sight lines.
-
-    Attributes:
-        world_from_sensor: (4, 4) the place they like best.
-        gain: Standard deviations by which they prefer it to where planes had put the frame.
-        clear: Standard deviations by which they prefer it to any place clearly apart.
-    """
-
-    world_from_sensor: rigid.Pose
-    gain: float
-    clear: float
-
-
-def slide(
-    earlier: Sequence[Sight],
-    sight: Sight,
-    expected: rigid.Pose,
-    axis: NDArray[np.float64],
-    reach_m: float,
-) -> Slide:
-    """Look along an axis (3,), world, about the expected pose for where a frame fits best.
-
-    Args:
-        earlier: Frames whose poses are known; at least one.
-        sight: The frame, at the pose that planes gave it.
-        expected: (4, 4) world_from_sensor on which the planes across the axis agree.
-        axis: (3,) the open direction.
-        reach_m: How far to look either way.
-    """
-
-    def agreement(pose: rigid.Pose) -> NDArray[np.float64]:
-        return np.concatenate(
-            [one.agreement(sight, rigid.invert(one.world_from_sensor) @ pose) for one in earlier]
-        )
-
-    def at(shift_m: float) -> rigid.Pose:
-        return rigid.translation(axis * shift_m) @ expected
-
-    farthest = max(reach_m, 2 * APART_M)
-    looks = np.arange(-farthest, farthest + STEP_M / 4, STEP_M / 2)
-    seen = [agreement(at(float(shift))) for shift in looks]
-    mean = np.array([np.nanmean(one) for one in seen])
-    near = np.abs(looks) <= reach_m + 1e-9
-    middle = looks[near][int(np.argmax(mean[near]))]
-    fine = np.arange(middle - STEP_M / 2, middle + STEP_M / 2, FINE_STEP_M / 2)
-    best = float(fine[int(np.argmax([np.nanmean(agreement(at(float(one)))) for one in fine]))])
-    there = agreement(at(best))
-    apart = np.flatnonzero(np.abs(looks - best) > APART_M)
-    rival = seen[apart[int(np.argmax(mean[apart]))]]
-    return Slide(at(best), gain(there, agreement(sight.world_from_sensor)), gain(there, rival))

@@ -38,7 +38,6 @@ class Located:
         alignment: The refined pose and its scores.
         rival: Score of the best distinct other answer over this one's; 0 when none was sought.
         rival_distance_m: How far away that other answer lies.
-        adrift: Whether neither planes nor sight lines fix one direction.
         sighted: Whether sight lines fix what planes leave open.
     """
 
@@ -46,7 +45,6 @@ class Located:
     alignment: Alignment
     rival: float = 0.0
     rival_distance_m: float = 0.0
-    adrift: bool = False
     sighted: bool = False
 
 

@@ -155,8 +155,7 @@ class Odometry:
             return []
         passed = self._open(opening)
         if self._given is None and 2 * len(self._tracker.open_axes) >= len(passed):
-            passed = self._freed(opening, passed)
-        self._tracker.slides = True
+            return self._freed(opening, passed)
         return passed
 
     def _freed(

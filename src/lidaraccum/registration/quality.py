@@ -76,8 +76,7 @@ class Judge:
         if located.rival > 1 - self._settings.ambiguity:
             distance = located.rival_distance_m
             doubts.append(f"another motion, {distance:.1f} m away, fits nearly as well")
-        weak = weakest_direction(alignment) < MIN_HOLD and not located.sighted
-        if weak or located.adrift:
+        if weakest_direction(alignment) < MIN_HOLD and not located.sighted:
             doubts.append(ADRIFT)
         if speed_mps > self._settings.max_speed_mps:
             doubts.append(f"it implies {speed_mps:.0f} m/s")

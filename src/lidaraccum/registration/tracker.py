@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lidaraccum.data.frame import BoolArray, Frame
 from lidaraccum.data.registered import RegisteredFrame, RegistrationQuality
 from lidaraccum.geometry import rigid
-from lidaraccum.registration.along import COARSE_POINTS, FAIR, SURE, open_axis, slide
+from lidaraccum.registration.along import COARSE_POINTS, open_axis
 from lidaraccum.registration.deskew import SweepClock
 from lidaraccum.registration.icp import align, assess
 from lidaraccum.registration.locate import Hypothesis, Located, proposed, refine, search
@@ -101,8 +101,6 @@ class Tracker:
         self._eye = Eye()
         self.sights: deque[Sight] = deque(maxlen=SIGHTS + 1)
         self.open_axes: list[NDArray[np.float64]] = []
-        self.slides = False
-        self._is_open = False
 
     def start(self, index: int, raw: Frame, usable: BoolArray, pose: rigid.Pose) -> RegisteredFrame:
         """Put the first frame on the empty map."""
@@ -141,7 +139,6 @@ class Tracker:
         source = scan.source(self._twist_to(pose, steps))
         placed = align(self._surface, source, pose, rail=rail)
         located = Located("steady", assess(self._surface, source, placed), sighted=True)
-        self._is_open = True
         self.open_axes.append(rail)
         self.twist = self._twist_to(placed, steps)
         quality = self._judge.judge(located, self._speed(placed, steps))
@@ -169,7 +166,7 @@ class Tracker:
             twist = found
             again = refine(self._surface, scan.source(twist), _start_of(located))
             located = replace(located, alignment=again.alignment)
-        located = self._slid(scan, located, expectation)
+        self._look_along(scan, located, expectation.steps)
         return self._conclude(scan, located, expectation)
 
     def _expect(self, index: int, raw: Frame, hints: tuple[Hypothesis, ...]) -> Expectation:
@@ -192,8 +189,6 @@ class Tracker:
         first, found = expectation.starts[0], None
         if expectation.known:
             found = refine(self._surface, source, first)
-            if self.slides and self._is_open:
-                return found
             if self._judge.trusts(found) and self._is_smooth(found, first, expectation.steps):
                 return found
         interval_s = expectation.steps * self._pace.interval_s
@@ -206,29 +201,14 @@ class Tracker:
         shifts = proposed(self._surface, source, first.world_from_sensor, reach, axes)
         return search(self._surface, source, [*expectation.starts, *shifts], found)
 
-    def _slid(self, scan: Scan, located: Located, expectation: Expectation) -> Located:
-        """Where planes leave a direction open, the place along it that sight lines prefer."""
+    def _look_along(self, scan: Scan, located: Located, steps: float) -> None:
+        """Note the direction that planes leave open, if they do."""
+        if scan.raw.origin.any() or scan.index >= self._settings.lookahead:
+            return
         pose = located.alignment.world_from_sensor
-        twist = self._twist_to(pose, expectation.steps)
-        source = scan.source(twist)
-        axis = open_axis(self._surface, source, pose)
-        self._is_open = axis is not None
-        if axis is None or scan.raw.origin.any():
-            return located
-        self.open_axes.append(axis)
-        if not self.slides or not expectation.known:
-            return located
-        expected = expectation.starts[0].world_from_sensor
-        on_rail = align(self._surface, source, expected, rail=axis)
-        interval_s = expectation.steps * self._pace.interval_s
-        reach_m = SMOOTH_M + 0.5 * MAX_ACCELERATION * interval_s**2
-        sight = self._sight(scan, scan.straightened(twist), twist, pose)
-        found = slide(list(self.sights)[-SIGHTS:], sight, on_rail, axis, reach_m)
-        away_m = abs(float((pose - on_rail)[:3, 3] @ axis))
-        if found.gain > (FAIR if away_m < reach_m else -SURE):
-            alignment = assess(self._surface, source, found.world_from_sensor)
-            located = replace(located, alignment=alignment)
-        return replace(located, adrift=found.clear < SURE, sighted=found.clear >= SURE)
+        axis = open_axis(self._surface, scan.source(self._twist_to(pose, steps)), pose)
+        if axis is not None:
+            self.open_axes.append(axis)
 
     def _sight(
         self, scan: Scan, frame: Frame, twist: NDArray[np.float64], pose: rigid.Pose
