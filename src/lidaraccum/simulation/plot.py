@@ -108,10 +108,21 @@ class Plot:
                 self.put(mesh, place, float(yaw), 0.05)
 
     def run_barrier(
-        self, maker: Callable[[Array, np.random.Generator], Mesh], line: Array, radius: float = 0.5
+        self,
+        maker: Callable[[Array, np.random.Generator], Mesh],
+        line: Array,
+        radius: float = 0.5,
+        margin: float = 0.3,
     ) -> None:
-        """Draw a barrier along the free stretch of ground points (K, 2), about a metre apart."""
-        keep = self.off_road(line, 0.3)
+        """Draw a barrier along the free stretch of ground points (K, 2), about a metre apart.
+
+        Args:
+            maker: Makes a barrier along ground points (K, 3).
+            line: (K, 2) metres.
+            radius: Half of what it takes up, metres.
+            margin: Least distance from a carriageway, metres; negative in a parking strip.
+        """
+        keep = self.off_road(line, margin)
         free = [ok and self.is_free(point, radius) for point, ok in zip(line, keep, strict=True)]
         breaks = np.flatnonzero(np.diff(np.r_[False, free, False].astype(int)))
         for start, end in zip(breaks[::2], breaks[1::2], strict=True):
