@@ -40,27 +40,41 @@ LINES: tuple[tuple[Callable[[Array, np.random.Generator], Mesh], float], ...] = 
 )  # fmt: skip
 """What runs between gardens and round their corners, and how often."""
 
+SEEN_M = 35.0
+"""Blocks further from the ego's way than this are left as they are."""
+
+LEAST_ROOM_M = 0.4
+"""What is scattered needs this much about it."""
+
 FREE_M = 0.45
 """Half of what a line of growth takes up."""
 
 
-def overgrow(site: Site, blocks: Sequence[tuple[Block, str]]) -> None:
-    """Fill what is left of the blocks; how much differs from world to world.
+def overgrow(site: Site, blocks: Sequence[tuple[Block, str]], way: Array) -> None:
+    """Fill what is left of the blocks near the ego; how much differs from world to world.
 
     Args:
         site: What is built on; all draws come from its generator.
         blocks: Blocks that were lined, with their styles.
+        way: (K, 2) where the ego drives, metres.
     """
     much = float(site.rng.beta(1.3, 1.0))
     for block, style in blocks:
         share = much * GREEN[style]
-        if share < 0.05:
+        if share < 0.05 or not _is_seen(block, way):
             continue
         _islands(site, block, share)
         _cars(site, block, share, style)
         _lines(site, block, share)
         _growth(site, block, share)
         _things(site, block, share)
+
+
+def _is_seen(block: Block, way: Array) -> bool:
+    """Whether any of the block is near the way; far ones are mostly hidden, and cost as much."""
+    spots, _ = block.at(np.linspace(0, block.length, 8), block.frontage)
+    gap = np.linalg.norm(spots[:, None] - way, axis=2)
+    return bool(gap.min() < SEEN_M)
 
 
 def _draw_line(rng: np.random.Generator) -> Callable[[Array, np.random.Generator], Mesh]:
@@ -172,21 +186,35 @@ def _growth(site: Site, block: Block, share: float) -> None:
     """Shrubs, clipped blocks and low crowns, near the pavement and further in."""
     rng, front, length = site.rng, block.frontage, block.length
     near, far = front + 0.4, front + rng.uniform(4, 12)
-    site.scatter(shrub, block, rng.poisson(share * length / 2.0), near, far)
-    site.scatter(clipped, block, rng.poisson(share * length / 8), near, far, along_street=True)
-    site.scatter(low_tree, block, rng.poisson(share * length / 4.0), near + 0.3, far + 8)
+    _scatter(site, shrub, block, rng.poisson(share * length / 2.0), near, far)
+    _scatter(site, clipped, block, rng.poisson(share * length / 8), near, far, along_street=True)
+    _scatter(site, low_tree, block, rng.poisson(share * length / 4.0), near + 0.3, far + 8)
     if block.road.walk_m >= 2 and rng.random() < 0.3 * share:
         lateral = block.road.half_m + 0.6
-        site.scatter(low_tree, block, rng.poisson(length / 14), lateral, lateral + 0.3)
+        _scatter(site, low_tree, block, rng.poisson(length / 14), lateral, lateral + 0.3)
 
 
 def _things(site: Site, block: Block, share: float) -> None:
     """Gate posts, rows of bins, sheds, tubs."""
     rng, front, length = site.rng, block.frontage, block.length
-    site.scatter(gate, block, rng.poisson(share * length / 18), front + 0.3, front + 0.6,
+    _scatter(site, gate, block, rng.poisson(share * length / 18), front + 0.3, front + 0.6,
                  along_street=True)  # fmt: skip
-    site.scatter(bins, block, rng.poisson(share * length / 25), front - 0.3, front + 2,
+    _scatter(site, bins, block, rng.poisson(share * length / 25), front - 0.3, front + 2,
                  along_street=True)  # fmt: skip
-    site.scatter(kiosk, block, rng.poisson(share * length / 45), front + 3, front + 14,
+    _scatter(site, kiosk, block, rng.poisson(share * length / 45), front + 3, front + 14,
                  along_street=True)  # fmt: skip
-    site.scatter(planter, block, rng.poisson(share * length / 40), front + 0.4, front + 4)
+    _scatter(site, planter, block, rng.poisson(share * length / 40), front + 0.4, front + 4)
+
+
+def _scatter(
+    site: Site, maker: Callable[[np.random.Generator], Mesh], block: Block, count: int,
+    near: float, far: float, *, along_street: bool = False,
+) -> None:  # fmt: skip
+    """As ``site.scatter``, but what would stand in something's place is not made at all."""
+    rng = site.rng
+    places, heading = block.at(rng.uniform(0, block.length, count), rng.uniform(near, far, count))
+    turn = rng.uniform(0, 2 * np.pi, count)
+    if along_street:
+        turn = 0.5 * np.pi * rng.integers(4, size=count)
+    room = site.plot.are_free(places, LEAST_ROOM_M)
+    site.plot.scatter(site.some(maker), places[room], (heading + turn)[room], 0.35)

@@ -63,7 +63,7 @@ def build_world(network: Network, reach_m: float, rng: np.random.Generator) -> W
     _plant_islands(plot, site)
     lined = [one for road in network.roads for one in line_road(site, road, network.kind)]
     plot.rng = growing
-    overgrow(Site(plot, Catalogue(growing)), lined)
+    overgrow(Site(plot, catalogue.drawing_from(growing)), lined, network.ego.at(along)[0])
     ground = [ground_mesh(terrain, network, rng), kerb_mesh(terrain, network, rng)]
     background = merge([*ground, *plot.parts])
     parked = [still.model.mesh.posed(still.world_from_object) for still in plot.stills]
