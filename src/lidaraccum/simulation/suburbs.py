@@ -213,8 +213,7 @@ def _scatter(
     """As ``site.scatter``, but what would stand in something's place is not made at all."""
     rng = site.rng
     places, heading = block.at(rng.uniform(0, block.length, count), rng.uniform(near, far, count))
-    turn = rng.uniform(0, 2 * np.pi, count)
-    if along_street:
-        turn = 0.5 * np.pi * rng.integers(4, size=count)
+    quarter = 0.5 * np.pi * rng.integers(4, size=count)
+    turn = quarter if along_street else rng.uniform(0, 2 * np.pi, count)
     room = site.plot.are_free(places, LEAST_ROOM_M)
     site.plot.scatter(site.some(maker), places[room], (heading + turn)[room], 0.35)
