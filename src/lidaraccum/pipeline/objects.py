@@ -38,6 +38,11 @@ cost so much more than a motion may."""
 PROBES = 5
 """So many of a longer window's frames, evenly over it, are asked for their verdict."""
 
+FEW_POINTS = 25
+FEW_COST = 0.8
+"""Fewer points than this find partners by chance wherever enough places are tried: they must be
+explained better, a motion may cost this share of what others' may, and are not asked for turns."""
+
 ABOUT_M = 10.0
 GOES_ALONG = 0.03
 """What stands so near to something that nobody saw through must not go along with it: not by so
@@ -152,6 +157,7 @@ def explain(
     saved = float(verdict.cost[0] - verdict.cost[best])
     if (
         turning[best] == 0
+        and _are_many(suspect)
         and verdict.cost[best] > WELL_EXPLAINED
         and saved > WORTH_A_BEND * settings.margin
         and not any(frame.registered.quality.doubts for frame in frames)
@@ -211,6 +217,10 @@ def _is_promising(cost: float, standing: float, settings: MotionSettings) -> boo
     return saved > FIRST_MARGIN * settings.margin and cost < settings.max_cost + REFINING_SAVES
 
 
+def _are_many(suspect: Suspect) -> bool:
+    return len(suspect) >= FEW_POINTS
+
+
 def _probes(frames: Sequence[SightedFrame]) -> Sequence[SightedFrame]:
     return frames[:: max(1, (len(frames) - 1) // (PROBES - 1))]
 
@@ -229,7 +239,7 @@ def _is_motion(
         settings.min_speed_mps < speed < settings.max_speed_mps
         and way > settings.min_shift_m
         and verdict.cost[0] - verdict.cost[best] > settings.margin
-        and verdict.cost[best] < settings.max_cost
+        and verdict.cost[best] < settings.max_cost * (1.0 if _are_many(suspect) else FEW_COST)
         and verdict.cost[best] < settings.max_share * verdict.cost[0]
         and verdict.shown[best] > settings.min_shown
         and (
