@@ -188,7 +188,7 @@ def _in_box(track: Track, frame: SightedFrame, growth: float) -> NDArray[np.int6
     velocity = track.velocities[frame.index]
     about = _about_shape(track.shape, track.world_from_object, frame, velocity)
     inside = track.shape.holds(_own_places(track.world_from_object, frame, about, velocity))
-    return about[inside] if inside.sum() < growth * track.points else _NONE
+    return about[inside] if inside.sum() < growth * track.most_points else _NONE
 
 
 def _near_shape(
