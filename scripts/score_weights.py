@@ -1,6 +1,7 @@
 """Scores weights on the simulator's test set or a labelled drive, the network doing it all itself.
 
-Usage: score_weights.py WEIGHTS [--windows 40] [--extent 64] [--threads 2] [--drive DIR]
+Usage: score_weights.py WEIGHTS [--windows 40] [--extent 64] [--threads 2]
+                        [--drive DIR [--classed]]
 
 Prints two Markdown tables: the whole network beside the paper's figures (its own poses, masks,
 objects and motions; five frames, the first the target, ground included, sweeps compensated), and
@@ -57,11 +58,16 @@ def main() -> None:
     parser.add_argument("--extent", type=float, default=64.0)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--drive", type=Path)
+    parser.add_argument("--classed", action="store_true", help="leave out points of no class")
     options = parser.parse_args()
     torch.set_num_threads(options.threads)
     network = load_network(options.weights)
     what = (options.windows, options.extent, network.settings)
-    batches = recorded_windows(options.drive, *what) if options.drive else simulated_windows(*what)
+    batches = (
+        recorded_windows(options.drive, *what, classed=options.classed)
+        if options.drive
+        else simulated_windows(*what)
+    )
     began = time.monotonic()
     with torch.no_grad():
         parts = [score_stages(network, batch) for batch in tqdm(batches, total=options.windows)]

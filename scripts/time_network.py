@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
+import numpy as np
 import torch
 
 from lidaraccum.model.batch import prepare, to_tensors
@@ -14,6 +15,7 @@ from lidaraccum.model.checkpoint import load_network
 from lidaraccum.model.motion import Windows
 from lidaraccum.model.network import presence_map, some_close_points
 from lidaraccum.model.precision import has_bfloat16, inference
+from lidaraccum.model.reader import NetworkReader
 from lidaraccum.model.weights import chosen_weights
 from lidaraccum.simulation.drive import simulate
 from lidaraccum.simulation.settings import DriveSettings
@@ -50,13 +52,17 @@ def main() -> None:
         timed(
             "of perceive: motion map",
             lambda: network.motion_map(
-                features.base, presence_map(features), poses, windows, tensors.stamps, 32.0
+                features.maps, presence_map(features), poses, windows, tensors.stamps, 32.0
             ),
         )
         points = some_close_points(features)
         seen = timed("perceive", lambda: network.perceive(features, poses, windows, points))
         ids = torch.arange(len(points)) % 30
         timed("track (29 objects)", lambda: network.track(seen, ids))
+    reader, still = NetworkReader(network), np.tile(np.eye(4), (5, 1, 1))
+    encoded = [reader.read(frame) for frame in frames]
+    timed("the pipeline's read (one frame)", lambda: reader.read(frames[0]))
+    timed("the pipeline's look (five frames)", lambda: reader.look(encoded, still, 0))
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import torch
 
 from lidaraccum.model.kabsch import invert
 from lidaraccum.model.motion import Windows, moments, read, warp
+from lidaraccum.model.network import Network
 
 
 def ramp(size: int = 32) -> torch.Tensor:
@@ -17,7 +18,7 @@ def ramp(size: int = 32) -> torch.Tensor:
 
 def test_a_reading_is_where_it_was_asked_for() -> None:
     xy = torch.tensor([[0.3, -1.7], [2.01, 3.0], [-3.6, 0.0]])
-    torch.testing.assert_close(read(ramp(), torch.zeros(3).long(), xy, 4.0), xy)
+    torch.testing.assert_close(read(ramp(), xy, 4.0), xy)
 
 
 def test_warped_features_lie_where_the_pose_puts_them() -> None:
@@ -26,14 +27,33 @@ def test_warped_features_lie_where_the_pose_puts_them() -> None:
     pose[:2, :2] = torch.stack([torch.stack([angle.cos(), -angle.sin()]),
                                 torch.stack([angle.sin(), angle.cos()])])  # fmt: skip
     pose[:2, 3] = torch.tensor([0.5, -0.3])
-    maps = torch.cat([ramp(), ramp()])
+    maps = [ramp(), ramp()]
     poses = torch.stack([torch.eye(4), pose])
-    warped = warp(maps, poses, Windows.single(2), 4.0)
+    warped = list(warp(maps, poses, Windows.single(2), 4.0))
     assert torch.equal(warped[0], maps[0])
     xy = torch.tensor([[0.4, 0.2], [-1.0, 1.5]])
-    there = read(warped, torch.ones(2).long(), xy, 4.0)
+    there = read(warped[1], xy, 4.0)
     back = invert(pose)
     torch.testing.assert_close(there, xy @ back[:2, :2].T + back[:2, 3], atol=1e-5, rtol=1e-5)
+
+
+def test_what_lies_beyond_the_grid_is_nothing() -> None:
+    pose = torch.eye(4)
+    pose[0, 3] = 2.0  # two metres ahead: a quarter of the grid
+    maps = [torch.ones(1, 3, 8, 8), torch.ones(1, 3, 8, 8)]
+    _, moved = warp(maps, torch.stack([torch.eye(4), pose]), Windows.single(2), 4.0)
+    assert (moved[:, :, :2] == 0).all()
+    torch.testing.assert_close(moved[:, :, 2:], torch.ones(1, 3, 6, 8))
+
+
+def test_maps_read_and_warped_have_gradients() -> None:
+    one = torch.rand(1, 3, 8, 8, requires_grad=True)
+    pose = torch.eye(4)
+    pose[:2, 3] = torch.tensor([0.3, -0.6])
+    _, moved = warp([one, one], torch.stack([torch.eye(4), pose]), Windows.single(2), 4.0)
+    moved[0, :, 4, 4].sum().backward()
+    assert one.grad is not None
+    torch.testing.assert_close(one.grad.sum(), torch.tensor(3.0))
 
 
 def test_the_time_a_place_was_taken_rises_along_the_way() -> None:
@@ -53,3 +73,13 @@ def test_the_time_a_place_was_taken_rises_along_the_way() -> None:
     assert float(spread[10, 21]) > float(spread[5, 6])
     assert torch.equal(at_target, taken[0])
     torch.testing.assert_close(often[8:20, 20:24], torch.ones(12, 4))
+
+
+def test_time_is_mixed_as_one_convolution_would(network: Network) -> None:
+    block = network.motion_map.blocks[0]
+    stack = torch.rand(3, block.time.out_channels, 8, 8)
+    own = torch.relu(block.space(stack))
+    nothing = torch.zeros_like(own[:1])
+    three = torch.cat([torch.cat([nothing, own[:-1]]), own, torch.cat([own[1:], nothing])], dim=1)
+    expected = stack + torch.relu(block.time(three))
+    torch.testing.assert_close(torch.cat(block(stack.split(1))), expected, atol=1e-5, rtol=1e-5)

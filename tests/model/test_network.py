@@ -99,6 +99,16 @@ def test_kept_features_are_fresh_features(network: Network, frames: list[Frame])
     assert torch.equal(again.ego.valid, fresh.ego.valid)
 
 
+def test_who_is_not_matched_is_seen_the_same(network: Network, frames: list[Frame]) -> None:
+    tensors = to_tensors([prepare(frame, network.settings) for frame in frames[:2]])
+    whole, bare = network.encode(tensors), network.encode(tensors, matchable=False)
+    assert torch.equal(whole.base, bare.base)
+    assert torch.equal(whole.foreground, bare.foreground)
+    assert bare.ego.feature.shape == (2, 0, network.settings.ego_channels)
+    apart = FrameFeatures.stack([bare.select(1), bare.select(0)])
+    assert torch.equal(apart.base, whole.base.flip(0))
+
+
 def test_windows_in_company_are_windows_alone(network: Network, frames: list[Frame]) -> None:
     features = encode(network, frames[:5], 16.0)
     together = network.perceive(features, still(5), Windows((2, 3), (0, 4)))

@@ -18,6 +18,11 @@ def test_it_is_the_maximum_of_each_group() -> None:
     assert (pooled[4] == 0).all()
 
 
+def test_it_holds_a_rectifier() -> None:
+    values = torch.tensor([[-2.0, 3.0], [-1.0, -4.0]])
+    assert tallest(values, torch.tensor([0, 0]), 1).tolist() == [[0.0, 3.0]]
+
+
 def test_its_gradient_is_that_of_differences() -> None:
     generator = torch.Generator().manual_seed(1)
     values = torch.rand(12, 2, generator=generator, dtype=torch.float64, requires_grad=True)

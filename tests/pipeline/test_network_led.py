@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -249,3 +250,26 @@ def test_a_frame_without_points_is_no_trouble(busy_street: Any, fresh: NetworkRe
     frames[3] = replace(frames[3], frame=empty)
     answers = NetworkLed(fresh).perceive(frames)
     assert [len(one.label) for one in answers] == [len(one.frame) for one in frames]
+
+
+class Broken(Liar):
+    """Cannot read the frame of that stamp."""
+
+    def read(self, frame: Frame) -> Frame:
+        if frame.stamp == self.speed_mps:
+            raise MemoryError(f"no room for frame {frame.stamp}")
+        return frame
+
+
+def test_an_error_of_the_network_reaches_the_caller(busy_street: Any) -> None:
+    stamp = busy_street.frames[4].frame.stamp
+    with pytest.raises(MemoryError, match=f"frame {stamp}"):
+        perceive(busy_street, Broken(stamp))
+
+
+def test_no_thread_outlives_its_caller(busy_street: Any) -> None:
+    before = threading.active_count()
+    answers = NetworkLed(Liar(2.0)).perceive(busy_street.frames)
+    next(answers)
+    answers.close()
+    assert threading.active_count() == before

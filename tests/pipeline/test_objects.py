@@ -56,6 +56,18 @@ def test_the_true_motion_costs_least(frames: list[SightedFrame], car: Template) 
     assert verdict.through[1] > 0.5 > verdict.through[0]
 
 
+def test_what_is_hidden_shows_nothing(frames: list[SightedFrame], car: Template) -> None:
+    """Before the sensor's eyes the car shows that it moves; behind a wall it might do anything."""
+    rivals = np.stack([np.zeros(3), CAR_VELOCITY])
+    seen = judge(car, rivals, frames, BALANCED)
+    assert seen.shown[0] == 0
+    assert seen.shown[1] > BALANCED.shown
+    behind = replace(car, world=car.world + np.array([0.0, 18.0, 0.0]))
+    hidden = judge(behind, rivals, frames, BALANCED)
+    assert hidden.cost[0] > 0.5
+    assert abs(hidden.shown[1]) < 0.05
+
+
 def test_a_rough_motion_is_refined(frames: list[SightedFrame], car: Template) -> None:
     refined = refine_velocity(car, CAR_VELOCITY + np.array([0.8, 0.5, 0.0]), frames, BALANCED)
     assert np.linalg.norm(refined - CAR_VELOCITY) < 0.6

@@ -151,11 +151,13 @@ class World:
     """All of the above, for tests that need more than one drive."""
 
     interval_s = INTERVAL_S
+    Street = Street
     street = staticmethod(street)
     drive = staticmethod(drive)
     shuffled = staticmethod(shuffled)
     compensated = staticmethod(compensated)
     rolling = Spinner(rolling=True)
+    dense = Spinner(beams=64, columns=800)
 
 
 @pytest.fixture(scope="session")

@@ -8,8 +8,8 @@ import pytest
 from lidaraccum.simulation.drive import DriveSettings, simulate
 from lidaraccum.simulation.mesh import merge
 from lidaraccum.simulation.raycast import Open3DRayCaster
-from lidaraccum.simulation.scan import aim
-from lidaraccum.simulation.surfaces import PASS_SHARE
+from lidaraccum.simulation.scan import CLEAREST_PANE, Encounter, _not_swallowed, aim
+from lidaraccum.simulation.surfaces import PASS_SHARE, Surface
 
 
 @pytest.mark.parametrize("sensor", ["HDL-32E", "VLP-32C-pair"])
@@ -35,3 +35,23 @@ def test_actors_in_their_own_coordinates_are_hit_as_in_the_worlds(sensor: str) -
     assert np.array_equal(
         np.isfinite(apart.distance[hits.triangle < 0]), np.zeros((hits.triangle < 0).sum(), bool)
     )
+
+
+def test_car_windows_swallow_what_went_in_each_car_by_its_own_share() -> None:
+    count, cars = 20_000, np.arange(1, 41, dtype=np.int32)
+    instance = np.repeat(cars, count)
+    rays = np.arange(len(instance))
+
+    def through(surface: Surface) -> tuple[np.ndarray, Encounter]:
+        flat = np.ones(len(rays), dtype=np.float32)
+        kinds = np.full(len(rays), surface, dtype=np.uint8)
+        found = Encounter(5 * flat, kinds, flat, flat, instance)
+        return _not_swallowed(found, rays, np.random.default_rng(0)), found
+
+    kept, found = through(Surface.CAR_GLASS)
+    shares = np.bincount(instance[kept], minlength=41)[1:] / count
+    assert shares.max() < CLEAREST_PANE + 0.02
+    assert np.ptp(shares) > 0.8 * CLEAREST_PANE
+    assert np.isinf(np.delete(found.distance, kept)).all()
+    assert np.isfinite(found.distance[kept]).all()
+    assert len(through(Surface.LEAVES)[0]) == len(rays)

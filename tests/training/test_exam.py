@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 
+from lidaraccum.data.frame import Labels
 from lidaraccum.errors import InputError, SettingsError
 from lidaraccum.model.network import build_network
 from lidaraccum.simulation.settings import DriveSettings
@@ -46,6 +49,22 @@ def test_windows_are_spread_over_a_recording(asked: list[DriveSettings], toy: Mo
     assert len(list(recorded_windows(Path("6"), 3, 16.0, toy.SMALL))) == 2
     with pytest.raises(InputError, match="too few"):
         list(recorded_windows(Path("4"), 3, 16.0, toy.SMALL))
+
+
+def test_points_of_no_class_may_be_left_out(
+    asked: list[DriveSettings], toy: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Classed(toy.CarPark):  # type: ignore[misc,name-defined]
+        def labels(self, index: int) -> Labels:
+            labels = super().labels(index)
+            semantic = np.arange(len(labels.instance), dtype=np.int16) % 3 - 1
+            return replace(labels, semantic=semantic)
+
+    monkeypatch.setattr(exam, "open_sequence", lambda folder: Classed(1, 5))
+    (all_of_them,) = recorded_windows(Path("5"), 1, 16.0, toy.SMALL)
+    (named,) = recorded_windows(Path("5"), 1, 16.0, toy.SMALL, classed=True)
+    assert all_of_them.truth.annotated.all()
+    assert named.truth.annotated.float().mean() == pytest.approx(1 / 3, abs=0.05)
 
 
 def test_every_part_is_scored_or_none(asked: list[DriveSettings], toy: ModuleType) -> None:

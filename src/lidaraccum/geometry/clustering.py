@@ -22,12 +22,18 @@ def connected_cells(positions: NDArray[Any], cell_m: float) -> NDArray[np.int64]
     """
     if len(positions) == 0:
         return np.zeros(0, dtype=np.int64)
-    cells = np.floor(positions[:, :2] * (1.0 / cell_m)).astype(np.int64)
-    cells -= cells.min(axis=0)
-    taken = np.zeros(cells.max(axis=0) + 1, dtype=np.int8)
-    taken[cells[:, 0], cells[:, 1]] = 1
-    named, _ = ndimage.label(taken, structure=_EIGHT)
-    return named[cells[:, 0], cells[:, 1]].astype(np.int64) - 1
+    rows, columns = (
+        np.floor(np.ascontiguousarray(axis) * (1.0 / cell_m)).astype(np.int64)
+        for axis in (positions[:, 0], positions[:, 1])
+    )
+    rows -= rows.min()
+    columns -= columns.min()
+    height, width = int(rows.max()) + 1, int(columns.max()) + 1
+    cells = rows * width + columns
+    taken = np.zeros(height * width, dtype=np.int8)
+    taken[cells] = 1
+    named, _ = ndimage.label(taken.reshape(height, width), structure=_EIGHT)
+    return named.ravel().take(cells).astype(np.int64) - 1
 
 
 def dbscan(

@@ -56,14 +56,21 @@ class Ground:
 
     def height_above(self, level_points: NDArray[Any]) -> NDArray[np.float64]:
         """Height (N,) above the ground of points (N, 3), metres, in level coordinates."""
-        cells = np.clip((level_points[:, :2] + REACH_M) / CELL_M - 0.5, 0.0, _CELLS - 1.001)
-        low = cells.astype(np.int64)
-        part = cells - low
-        flat = low[:, 0] * _CELLS + low[:, 1]
+        row, down = _split(level_points[:, 0])
+        column, right = _split(level_points[:, 1])
+        flat = row * _CELLS + column
         table = self.heights.ravel()
-        near = table[flat] * (1 - part[:, 1]) + table[flat + 1] * part[:, 1]
-        far = table[flat + _CELLS] * (1 - part[:, 1]) + table[flat + _CELLS + 1] * part[:, 1]
-        return level_points[:, 2] - (near * (1 - part[:, 0]) + far * part[:, 0])
+        near = table[flat] * (1 - right) + table[flat + 1] * right
+        flat += _CELLS
+        far = table[flat] * (1 - right) + table[flat + 1] * right
+        return level_points[:, 2] - (near * (1 - down) + far * down)
+
+
+def _split(along: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[Any]]:
+    """Cells whose centres come before places (N,) on an axis, and the way on to the next, 0..1."""
+    cells = np.clip((along + REACH_M) / CELL_M - 0.5, 0.0, _CELLS - 1.001)
+    low = cells.astype(np.int64)
+    return low, cells - low
 
 
 def estimate_ground(points: NDArray[Any]) -> Ground:
@@ -72,30 +79,34 @@ def estimate_ground(points: NDArray[Any]) -> Ground:
     Works without any ground in sight too (then level is the sensor's own level, at the height of
     the lowest points), and does not depend on the order of the points.
     """
-    plane = _fit_plane(_lowest(points[:, :2], points[:, 2]))
+    plane = _fit_plane(_without_strays(_lowest(points)))
     level_from_sensor = _levelling(plane)
     level = transform(level_from_sensor, points)
-    level = level[~_under_the_road(level, float(level_from_sensor[2, 3]))]
-    return Ground(level_from_sensor, _follow(_lowest(level[:, :2], level[:, 2])))
+    deep = level[:, 2] < -STRAY_M
+    low = _lowest(level, ~deep)
+    if deep.any():
+        below = level[deep]
+        below = below[~_under_the_road(below, low, float(level_from_sensor[2, 3]))]
+        low = np.fmin(low, _lowest(below))
+    return Ground(level_from_sensor, _follow(_without_strays(low)))
 
 
-def _under_the_road(level: NDArray[Any], mount_m: float) -> NDArray[np.bool_]:
-    """Points (N,) that only a ray through the road could have met: mirror images and the like.
+def _under_the_road(
+    deep: NDArray[np.float64], low: NDArray[np.float64], mount_m: float
+) -> NDArray[np.bool_]:
+    """Deep points (N, 3) that only a ray through the road could have met: mirror images, say.
 
-    The road must have been seen where the ray crosses its plane, and half way from there to the
-    point nothing lower; a ditch or a slope beyond the road's edge is not under the road.
+    The road (all else's lowest points, (G, G)) must have been seen where the ray crosses its plane,
+    and half way from there to the point nothing lower; a ditch or a slope beyond the road's edge is
+    not under the road.
     """
-    under = np.zeros(len(level), dtype=bool)
-    deep = np.flatnonzero(level[:, 2] < -STRAY_M)
-    if mount_m < LEAST_MOUNT_M or len(deep) == 0:
-        return under
-    shallow = level[level[:, 2] >= -STRAY_M]
-    low = _lowest(shallow[:, :2], shallow[:, 2])
-    crossing = mount_m / (mount_m - level[deep, 2])
-    at_crossing = _look_up(low, level[deep, :2] * crossing[:, None])
-    half_way = _look_up(low, level[deep, :2] * (0.5 + 0.5 * crossing)[:, None])
-    under[deep] = (np.abs(at_crossing) < FLAT_M) & ~(half_way < -FLAT_M)
-    return under
+    if mount_m < LEAST_MOUNT_M:
+        return np.zeros(len(deep), dtype=bool)
+    low = _without_strays(low)
+    crossing = mount_m / (mount_m - deep[:, 2])
+    at_crossing = _look_up(low, deep[:, :2] * crossing[:, None])
+    half_way = _look_up(low, deep[:, :2] * (0.5 + 0.5 * crossing)[:, None])
+    return (np.abs(at_crossing) < FLAT_M) & ~(half_way < -FLAT_M)
 
 
 def _look_up(low: NDArray[np.float64], xy: NDArray[Any]) -> NDArray[np.float64]:
@@ -107,19 +118,22 @@ def _look_up(low: NDArray[np.float64], xy: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def _keys(xy: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Which of places (N, 2) are on the map (K,), and their cells in the flat map (K,)."""
-    cells = np.floor((xy + REACH_M) / CELL_M).astype(np.int64)
-    inside = np.flatnonzero(((cells >= 0) & (cells < _CELLS)).all(axis=1))
-    return inside, cells[inside, 0] * _CELLS + cells[inside, 1]
+    """Which of places (N, 2 or more) are on the map (K,), and their cells in the flat map (K,)."""
+    row, column = (xy[:, 0] + REACH_M) / CELL_M, (xy[:, 1] + REACH_M) / CELL_M
+    inside = np.flatnonzero((row >= 0) & (row < _CELLS) & (column >= 0) & (column < _CELLS))
+    return inside, row[inside].astype(np.int64) * _CELLS + column[inside].astype(np.int64)
 
 
-def _lowest(xy: NDArray[Any], z: NDArray[Any]) -> NDArray[np.float64]:
-    """Lowest z (G, G) in each cell; NaN where there is no point."""
-    inside, key = _keys(xy)
+def _lowest(points: NDArray[Any], chosen: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
+    """Lowest z (G, G) of points (N, 3), or of those chosen (N,), in each cell; NaN without any."""
+    inside, key = _keys(points)
+    z = points[inside, 2].astype(np.float64)
+    if chosen is not None:
+        z[~chosen[inside]] = np.inf
     low = np.full(_CELLS * _CELLS, np.inf)
-    np.minimum.at(low, key, z[inside].astype(np.float64))
+    np.minimum.at(low, key, z)
     low[~np.isfinite(low)] = np.nan
-    return _without_strays(low.reshape(_CELLS, _CELLS))
+    return low.reshape(_CELLS, _CELLS)
 
 
 def _without_strays(low: NDArray[np.float64]) -> NDArray[np.float64]:

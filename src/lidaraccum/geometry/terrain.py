@@ -27,7 +27,8 @@ ROAD_ROUNDS = 10
 FEWEST_CELLS = 12
 
 _CELLS = int(2 * REACH_M / CELL_M)
-_DEPTH_MM = 1 << 17
+_DEPTH_BITS = 18
+_DEPTH_MM = 1 << (_DEPTH_BITS - 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,9 +43,30 @@ class Terrain:
 
     def height_above(self, points: NDArray[Any]) -> NDArray[np.float64]:
         """Height (N,) above the ground of points (N, 3), metres, in the frame's coordinates."""
-        cells = (points[:, :2].T + REACH_M) / CELL_M - 0.5
-        ground = ndimage.map_coordinates(self.heights, cells, order=1, mode="nearest")
-        return points[:, 2] - ground
+        x, y, z = points.T
+        row, down = _cell_and_rest(x)
+        column, across = _cell_and_rest(y)
+        corner = row * _CELLS + column
+        heights = self.heights.astype(np.float32).ravel()
+        near, far = (
+            (1 - across) * heights.take(first) + across * heights.take(first + 1)
+            for first in (corner, corner + _CELLS)
+        )
+        return z - ((1 - down) * near + down * far).astype(np.float64)
+
+
+def _cell_and_rest(
+    across: NDArray[Any],
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """The cell (N,) whose centre lies before places (N,), metres, and how far on they are, 0..1."""
+    cells = np.clip(
+        (across.astype(np.float32) + np.float32(REACH_M)) * np.float32(1 / CELL_M)
+        - np.float32(0.5),
+        0,
+        _CELLS - 1,
+    )
+    cell = np.minimum(cells.astype(np.int64), _CELLS - 2)
+    return cell, cells - cell.astype(np.float32)
 
 
 def estimate_terrain(points: NDArray[Any]) -> Terrain:
@@ -97,15 +119,21 @@ def _road(low: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _low_points(points: NDArray[Any]) -> NDArray[np.float64]:
     """Nearly lowest z (G, G) of each cell's points, inf where there are none."""
-    cells = np.floor((points[:, :2] + REACH_M) / CELL_M).astype(np.int64)
-    inside = ((cells >= 0) & (cells < _CELLS)).all(axis=1)
-    # Cell and height packed into one integer sort much faster than a lexical sort of both.
-    millimetres = np.clip(points[inside, 2] * 1000.0, -_DEPTH_MM, _DEPTH_MM).astype(np.int64)
-    packed = np.sort(
-        (cells[inside, 0] * _CELLS + cells[inside, 1]) * (2 * _DEPTH_MM + 1)
-        + (millimetres + _DEPTH_MM)
+    x, y, z = np.ascontiguousarray(points.T, dtype=np.float32)
+    inside = np.flatnonzero((np.abs(x) < REACH_M) & (np.abs(y) < REACH_M))
+    row, column = (
+        ((across.take(inside) + np.float32(REACH_M)) * np.float32(1 / CELL_M)).astype(np.int32)
+        for across in (x, y)
     )
-    key, raised = np.divmod(packed, 2 * _DEPTH_MM + 1)
+    # Cell and height packed into one integer sort much faster than a lexical sort of both.
+    millimetres = np.clip(z.take(inside) * np.float32(1000), -_DEPTH_MM, _DEPTH_MM - 1)
+    packed = (np.minimum(row, _CELLS - 1) * _CELLS + np.minimum(column, _CELLS - 1)).astype(
+        np.int64
+    )
+    packed <<= _DEPTH_BITS
+    packed += millimetres.astype(np.int32) + _DEPTH_MM
+    packed.sort()
+    key, raised = packed >> _DEPTH_BITS, packed & (2 * _DEPTH_MM - 1)
     starts = np.flatnonzero(np.diff(key, prepend=-1))
     counts = np.diff(np.append(starts, len(key)))
     chosen = starts + np.minimum(counts - 1, np.where(counts > 20, 3, 1))

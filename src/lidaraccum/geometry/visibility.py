@@ -8,7 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lidaraccum.geometry import rigid
+
 BoolArray = NDArray[np.bool_]
+Columns = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]
 
 FINEST_COLUMNS = 1440
 COARSEST_COLUMNS = 180
@@ -65,10 +68,10 @@ class RangeView:
         self._step = float(np.clip(elevation_step, FINEST_ELEVATION_STEP, COARSEST_ELEVATION_STEP))
         self._rows = int(np.pi / self._step) + 2
         self._columns = FINEST_COLUMNS
-        x, y, z, ranges = self._seen(points)
-        pixels = self._pixels(x, y, z, ranges)[ranges > MIN_RANGE_M]
+        pixels, ranges = self._pixels(*self._seen(points, None))
+        echo = ranges > MIN_RANGE_M
         flat = np.full(self._rows * self._columns, np.inf, dtype=np.float32)
-        np.minimum.at(flat, pixels, ranges[ranges > MIN_RANGE_M])
+        np.minimum.at(flat, pixels[echo], ranges[echo])
         image = flat.reshape(self._rows, self._columns)
         seen = np.flatnonzero(np.isfinite(image).any(axis=1))
         # A spinning sensor looks at a band; one row about it, and nothing is known beyond.
@@ -82,32 +85,42 @@ class RangeView:
             self._nearest[place] = _nearest_about(band)
             self._nearest_solid[place] = _nearest_about(_without_specks(band))
 
-    def look(self, points: NDArray[Any]) -> Sighting:
-        """What the frame saw of places (N, 3), metres, in its coordinates."""
-        x, y, z, ranges = self._seen(points)
-        pixels = self._pixels(x, y, z, ranges)
+    def look(self, points: NDArray[Any], own_from_points: rigid.Pose | None = None) -> Sighting:
+        """What the frame saw of places (N, 3), metres.
+
+        Args:
+            points: In any coordinates; quickest column by column.
+            own_from_points: (4, 4) into the frame's coordinates; they are in these when None.
+        """
+        pixels, ranges = self._pixels(*self._seen(points, own_from_points))
         margin = MARGIN_M + MARGIN_PER_M * ranges
-        behind = self._nearest_solid[pixels] - ranges
-        met = (np.abs(behind) <= margin) | (np.abs(self._nearest[pixels] - ranges) <= margin)
+        behind = self._nearest_solid.take(pixels) - ranges
+        met = (np.abs(behind) <= margin) | (np.abs(self._nearest.take(pixels) - ranges) <= margin)
         return Sighting(through=(behind > margin) & ~met, met=met)
 
-    def _seen(self, points: NDArray[Any]) -> tuple[NDArray[np.float32], ...]:
-        """x, y, z and range (N,) of points (N, 3) from the viewpoint."""
-        x, y, z = np.ascontiguousarray((points - self._viewpoint).T, dtype=np.float32)
-        return x, y, z, np.sqrt(x * x + y * y + z * z)
+    def _seen(self, points: NDArray[Any], pose: rigid.Pose | None) -> Columns:
+        """x, y, z (N,) of points (N, 3) from the viewpoint; a pose (4, 4) takes them here."""
+        if pose is None:
+            x, y, z = np.ascontiguousarray((points - self._viewpoint).T, dtype=np.float32)
+            return x, y, z
+        x, y, z = np.ascontiguousarray(points.T, dtype=np.float32)
+        rows = np.array(pose[:3], dtype=np.float32)
+        rows[:, 3] -= self._viewpoint
+        x, y, z = (a * x + b * y + c * z + along for a, b, c, along in rows)
+        return x, y, z
 
     def _pixels(
-        self,
-        x: NDArray[np.float32],
-        y: NDArray[np.float32],
-        z: NDArray[np.float32],
-        ranges: NDArray[np.float32],
-    ) -> NDArray[np.int64]:
+        self, x: NDArray[np.float32], y: NDArray[np.float32], z: NDArray[np.float32]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        """Pixel and range (N,) each of places x, y, z (N,) from the viewpoint."""
+        level = x * x + y * y
         azimuth = np.arctan2(y, x) + np.float32(np.pi)
-        elevation = np.arcsin(np.clip(z / np.maximum(ranges, 1e-6), -1, 1)) + np.float32(np.pi / 2)
-        column = (azimuth * np.float32(self._columns / (2 * np.pi))).astype(np.int64)
-        row = (elevation * np.float32(1 / self._step)).astype(np.int64)
-        return row * self._columns + column % self._columns
+        elevation = np.arctan2(z, np.sqrt(level)) + np.float32(np.pi / 2)
+        column = (azimuth * np.float32(self._columns / (2 * np.pi))).astype(np.int32)
+        column[column == self._columns] = 0
+        row = (elevation * np.float32(1 / self._step)).astype(np.int32)
+        row *= self._columns
+        return (row + column).astype(np.int64), np.sqrt(level + z * z)
 
 
 def _without_gaps(image: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -160,11 +173,11 @@ def elevation_gap(points: NDArray[Any]) -> float:
     """
     fine = np.deg2rad(0.2)
     x, y, z = np.ascontiguousarray(points.T, dtype=np.float32)
-    elevation = np.arctan2(z, np.hypot(x, y))
-    column = ((np.arctan2(y, x) + np.float32(np.pi)) * (180 / np.pi)).astype(np.int64)
-    row = ((elevation + np.float32(np.pi / 2)) / fine).astype(np.int64)
+    elevation = np.arctan2(z, np.hypot(x, y)) + np.float32(np.pi / 2)
+    column = ((np.arctan2(y, x) + np.float32(np.pi)) * np.float32(180 / np.pi)).astype(np.int32)
+    row = (elevation / fine).astype(np.int32)
     seen = np.zeros((361, int(np.pi / fine) + 2), dtype=np.bool_)
-    seen[column, row] = True
+    seen.ravel()[(column * np.int32(seen.shape[1]) + row).astype(np.int64)] = True
     counts = seen.sum(axis=1)
     full = counts > 4
     if not full.any():

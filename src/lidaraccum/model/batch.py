@@ -62,22 +62,22 @@ def prepare(
     kept = np.flatnonzero(frame.returned)
     if len(kept) == 0:
         raise InputError(f"frame {frame.name or frame.stamp} has no point that returned")
-    points = frame.points[kept]
+    points = frame.points.take(kept, axis=0)  # several times faster than by brackets
     ground = estimate_ground(points)
     level = rigid.transform(ground.level_from_sensor, points)
+    row, column = ((level[:, axis] + 0.5 * extent) / settings.pillar_m for axis in (0, 1))
+    inside = np.flatnonzero((row >= 0) & (row < cells) & (column >= 0) & (column < cells))
+    cell = row[inside].astype(np.int32) * np.int32(cells) + column[inside].astype(np.int32)
+    level = level.take(inside, axis=0)
     height = ground.height_above(level)
-    index = np.floor((level[:, :2] + 0.5 * extent) / settings.pillar_m).astype(np.int32)
-    inside = ((index >= 0) & (index < cells)).all(axis=1)
-    inside &= (height > settings.lowest_m) & (height < settings.highest_m)
-    cell = index[:, 0] * cells + index[:, 1]
-    chosen = np.flatnonzero(inside)
+    chosen = np.flatnonzero((height > settings.lowest_m) & (height < settings.highest_m))
     if len(chosen) == 0:
         raise InputError(f"frame {frame.name or frame.stamp} has no point within {extent / 2:g} m")
     chosen = chosen[np.argsort(cell[chosen])]
     return PreparedFrame(
-        points=level[chosen].astype(np.float32),
+        points=level.take(chosen, axis=0).astype(np.float32),
         height=height[chosen].astype(np.float32),
-        rows=kept[chosen],
+        rows=kept[inside[chosen]],
         cell=cell[chosen],
         level_from_sensor=ground.level_from_sensor,
         stamp=frame.stamp,

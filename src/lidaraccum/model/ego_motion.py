@@ -57,6 +57,14 @@ class EgoPillars(_Rows):
     valid: torch.Tensor
     level_from_sensor: torch.Tensor
 
+    @classmethod
+    def none(cls, level_from_sensor: torch.Tensor, channels: int) -> EgoPillars:
+        """No pillars, of F frames (F, 4, 4) that nobody is to match."""
+        shape = (len(level_from_sensor), 0)
+        position = level_from_sensor.new_zeros(*shape, 3)
+        feature = level_from_sensor.new_zeros(*shape, channels)
+        return cls(position, feature, position[..., 0].bool(), level_from_sensor)
+
 
 @dataclass(frozen=True, eq=False)
 class EgoMatch(_Rows):

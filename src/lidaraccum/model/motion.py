@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import torch
 from torch import nn
@@ -85,7 +87,7 @@ class MotionMap(nn.Module):
 
     def forward(
         self,
-        base: torch.Tensor,
+        base: Sequence[torch.Tensor],
         presence: torch.Tensor,
         target_from_frame: torch.Tensor,
         windows: Windows,
@@ -94,34 +96,40 @@ class MotionMap(nn.Module):
     ) -> torch.Tensor:
         """Features of W windows.
 
+        Frames go one by one until they are compared: together they would fill memory, not time.
+
         Args:
-            base: (F, C, S, S) base features, each in its own level coordinates.
+            base: Of each of F frames (1, C, S, S) base features, in its own level coordinates.
             presence: (F, 1, S, S) 0..1: how likely something movable was met there.
             target_from_frame: (F, 4, 4) between level coordinates.
             windows: Which frames belong together.
             stamps: Seconds of the F frames.
             half_extent_m: Half the side of the grid, metres.
         """
-        both = torch.cat([base, presence.to(base.dtype)], dim=1)
-        warped = warp(both, target_from_frame, windows, half_extent_m)
-        times = _times(windows, stamps, base.device)
-        stack = torch.relu(self.halve(warped[:, :-1]) + self.clock(times)[:, :, None, None])
-        before, after = _neighbours(windows, base.device)
-        for block in self.blocks:
-            stack = block(stack, before, after)
-        lengths = list(windows.lengths)
-        taken = nn.functional.max_pool2d(warped[:, -1:].float(), 2)[:, 0]
-        parts = zip(
-            torch.split(stack, lengths),
-            torch.split(taken, lengths),
-            torch.split(times, lengths),
-            strict=True,
-        )
-        maps = [
-            torch.cat([part.amax(dim=0), moments(own, when).to(part.dtype)])
-            for part, own, when in parts
+        times = _times(windows, stamps, presence.device)
+        warped = warp(torch.split(presence, 1), target_from_frame, windows, half_extent_m)
+        taken = nn.functional.max_pool2d(torch.cat(list(warped)), 2)[:, 0]
+        halved = [
+            self._halve(one, when)
+            for one, when in zip(
+                warp(base, target_from_frame, windows, half_extent_m), times, strict=True
+            )
         ]
-        return self.unet(torch.stack(maps).contiguous(memory_format=torch.channels_last))
+        maps, first = [], 0
+        for length in windows.lengths:
+            own = slice(first, first + length)
+            stack = halved[own]
+            for block in self.blocks:
+                stack = block(stack)
+            summary = moments(taken[own], times[own])[None].to(stack[0].dtype)
+            maps.append(torch.cat([reduce(torch.maximum, stack), summary], dim=1))
+            first += length
+        return self.unet(torch.cat(maps).contiguous(memory_format=torch.channels_last))
+
+    def _halve(self, base: torch.Tensor, when: torch.Tensor) -> torch.Tensor:
+        """(1, C'', S/2, S/2) of warped base features (1, C, S, S), told their time (3,)."""
+        bias = self.halve.bias + self.clock(when)
+        return torch.relu_(nn.functional.conv2d(base, self.halve.weight, bias, stride=2))
 
 
 def moments(taken: torch.Tensor, times: torch.Tensor) -> torch.Tensor:
@@ -145,23 +153,22 @@ class _TemporalBlock(nn.Module):
         self.space = nn.Conv2d(channels, channels, 3, padding=1)
         self.time = nn.Conv2d(3 * channels, channels, 1)
 
-    def forward(
-        self, stack: torch.Tensor, before: torch.Tensor, after: torch.Tensor
-    ) -> torch.Tensor:
-        own = torch.relu(self.space(stack))
-        # One map of zeros at the end stands for the frame before the first and after the last.
-        padded = torch.cat([own, torch.zeros_like(own[:1])])
-        three = torch.cat([padded[before], own, padded[after]], dim=1)
-        return stack + torch.relu(self.time(three))
-
-
-def _neighbours(windows: Windows, device: torch.device) -> tuple[torch.Tensor, torch.Tensor]:
-    """Index (F,) of the frame before and after within the window; F where there is none."""
-    owner = windows.of_frame
-    count = len(owner)
-    before = [i - 1 if i > 0 and owner[i - 1] == owner[i] else count for i in range(count)]
-    after = [i + 1 if i + 1 < count and owner[i + 1] == owner[i] else count for i in range(count)]
-    return torch.tensor(before, device=device), torch.tensor(after, device=device)
+    def forward(self, stack: Sequence[torch.Tensor]) -> list[torch.Tensor]:
+        """Mix the frames of one window, each (1, C, H, H), in order of time."""
+        own = [torch.relu_(self.space(one)) for one in stack]
+        rows = [_rows(one) for one in own]
+        # As a convolution of three frames side by side, but they are never copied side by side.
+        weights = torch.split(self.time.weight[:, :, 0, 0], len(self.time.weight), dim=1)
+        mixed = []
+        for place, one in enumerate(stack):
+            cells = nn.functional.linear(rows[place], weights[1], self.time.bias)
+            if place > 0:
+                cells = torch.addmm(cells, rows[place - 1], weights[0].T)
+            if place + 1 < len(stack):
+                cells = torch.addmm(cells, rows[place + 1], weights[2].T)
+            cells = torch.relu_(cells) + _rows(one)
+            mixed.append(cells.view(1, *one.shape[2:], -1).permute(0, 3, 1, 2))
+        return mixed
 
 
 def _times(windows: Windows, stamps: tuple[float, ...], device: torch.device) -> torch.Tensor:
@@ -173,57 +180,92 @@ def _times(windows: Windows, stamps: tuple[float, ...], device: torch.device) ->
 
 
 def warp(
-    base: torch.Tensor, target_from_frame: torch.Tensor, windows: Windows, half_extent_m: float
-) -> torch.Tensor:
-    """Base features (F, C, S, S) of each frame, read where the target's cells lie in that frame.
+    maps: Sequence[torch.Tensor],
+    target_from_frame: torch.Tensor,
+    windows: Windows,
+    half_extent_m: float,
+) -> Iterator[torch.Tensor]:
+    """Maps (1, C, S, S) of each of F frames, read where the target's cells lie in that frame.
 
-    The target's own features stay as they are. Cells are taken to lie on the ground's plane.
+    The target's own map stays as it is. Cells are taken to lie on the ground's plane.
     """
     sources = windows.sources
-    if not sources:
-        return base
-    index = torch.tensor(sources, device=base.device)
-    with exactly(base):
-        grid = _sampling_grid(target_from_frame[index].float(), base.shape[2], half_extent_m)
-        moved = nn.functional.grid_sample(
-            base[index].float(), grid, mode="bilinear", padding_mode="zeros", align_corners=False
-        )
-    return base.index_copy(0, index, moved.to(base.dtype))
+    for frame, one in enumerate(maps):
+        if frame not in sources:
+            yield one
+            continue
+        with exactly(one):
+            pose = target_from_frame[frame].float()
+            moved = _sample(one, *_cells_there(pose, one.shape[2], half_extent_m))
+        yield moved.view(one.shape[2], one.shape[3], -1).permute(2, 0, 1)[None]
 
 
-def _sampling_grid(
+def _cells_there(
     target_from_frame: torch.Tensor, size: int, half_extent_m: float
-) -> torch.Tensor:
-    """(K, S, S, 2) where in each frame the target's cell centres lie, -1..1, y before x."""
-    rotation, shift = target_from_frame[:, :3, :3], target_from_frame[:, :3, 3:]
-    back = rotation.transpose(1, 2)
-    offset = -(back @ shift)[:, :2, 0] / half_extent_m
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Where in the frame the target's cell centres lie, x and y (S * S,) each, in cells."""
+    rotation, shift = target_from_frame[:3, :3], target_from_frame[:3, 3:]
+    back = rotation.T
+    offset = -(back @ shift)[:2, 0] / half_extent_m
     centres = (torch.arange(size, device=shift.device) + 0.5) * (2.0 / size) - 1.0
-    x, y = centres[None, :, None], centres[None, None, :]
-    turn = back[:, :2, :2, None, None]
-    x_there = turn[:, 0, 0] * x + turn[:, 0, 1] * y + offset[:, 0, None, None]
-    y_there = turn[:, 1, 0] * x + turn[:, 1, 1] * y + offset[:, 1, None, None]
-    return torch.stack([y_there, x_there], dim=-1)
+    x, y = centres[:, None], centres[None, :]
+    x_there = back[0, 0] * x + back[0, 1] * y + offset[0]
+    y_there = back[1, 0] * x + back[1, 1] * y + offset[1]
+    return _to_cells(x_there.view(-1), size), _to_cells(y_there.view(-1), size)
 
 
-def read(
-    maps: torch.Tensor, index: torch.Tensor, xy: torch.Tensor, half_extent_m: float
-) -> torch.Tensor:
-    """Bilinear reading (Q, C) of maps (N, C, H, H) at points: map index (Q,), x and y (Q, 2).
+def _to_cells(place: torch.Tensor, size: int) -> torch.Tensor:
+    """Places -1..1 over the grid as cells, 0 at the first one's centre."""
+    return (place + 1.0) * (0.5 * size) - 0.5
+
+
+def read(one: torch.Tensor, xy: torch.Tensor, half_extent_m: float) -> torch.Tensor:
+    """Bilinear reading (Q, C) of a map (1, C, H, H) at points' x and y (Q, 2), metres.
 
     Outside the grid the nearest cell at its edge is read.
     """
-    size = maps.shape[2]
-    cell = ((xy / half_extent_m + 1.0) * (0.5 * size) - 0.5).clamp(0.0, size - 1.0)
-    low = cell.floor().clamp_max(size - 2.0)
-    part = (cell - low).to(maps.dtype)
-    corner = low.long()
-    flat = (index * size + corner[:, 0]) * size + corner[:, 1]
-    rows = maps.permute(0, 2, 3, 1).reshape(-1, maps.shape[1])
-    px, py = part[:, :1], part[:, 1:]
-    near = rows.index_select(0, flat) * (1 - py) + rows.index_select(0, flat + 1) * py
-    far = rows.index_select(0, flat + size) * (1 - py) + rows.index_select(0, flat + size + 1) * py
-    return near * (1 - px) + far * px
+    size = one.shape[2]
+    cells = _to_cells(xy.T / half_extent_m, size).clamp_(0.0, size - 1.0)
+    return _sample(one, cells[0], cells[1])
+
+
+def _sample(one: torch.Tensor, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
+    """Bilinear reading (Q, C) of a map (1, C, H, H) at x and y (Q,) each, in cells; 0 outside.
+
+    A weighted sum of four rows each: several times faster on processors than `grid_sample`, for
+    channels lie together in memory.
+    """
+    size = one.shape[2]
+    corners = [
+        (row * size + column, share * part)
+        for row, share in _neighbours(x, size)
+        for column, part in _neighbours(y, size)
+    ]
+    summed = nn.functional.embedding_bag(
+        torch.stack([index for index, _ in corners], dim=1),
+        _rows(one).float(),
+        mode="sum",
+        per_sample_weights=torch.stack([weight for _, weight in corners], dim=1),
+    )
+    return summed.to(one.dtype)
+
+
+def _neighbours(at: torch.Tensor, size: int) -> list[tuple[torch.Tensor, torch.Tensor]]:
+    """The two cells (Q,) int32 beside places (Q,) on an axis, and their shares; 0 if outside."""
+    low = at.floor()
+    part = at - low
+    return [
+        (
+            cell.clamp(0.0, size - 1.0).int(),
+            torch.where((cell < 0.0) | (cell > size - 1.0), 0.0, share),
+        )
+        for cell, share in ((low, 1.0 - part), (low + 1.0, part))
+    ]
+
+
+def _rows(one: torch.Tensor) -> torch.Tensor:
+    """Cells (H * H, C) of a map (1, C, H, H): a view where channels are last in memory."""
+    return one.permute(0, 2, 3, 1).reshape(-1, one.shape[1])
 
 
 class PointHead(nn.Module):
@@ -237,17 +279,17 @@ class PointHead(nn.Module):
     def __init__(self, settings: NetworkSettings) -> None:
         super().__init__()
         channels = settings.point_channels
-        self.place = nn.Sequential(linear(_POINT_PLACE, 32), nn.ReLU(), linear(32, 64))
+        self.place = nn.Sequential(linear(_POINT_PLACE, 32), nn.ReLU(inplace=True), linear(32, 64))
         read_channels = settings.motion_widths[0] + settings.base_widths[0]
         self.mix = nn.Sequential(
             linear(read_channels + 64, channels),
-            nn.ReLU(),
+            nn.ReLU(inplace=True),
             linear(channels, channels),
-            nn.ReLU(),
+            nn.ReLU(inplace=True),
         )
         self.foreground = nn.Linear(channels, 1)
         self.dynamic = nn.Linear(channels, 1)
-        self.offset = nn.Sequential(linear(channels, 64), nn.ReLU(), nn.Linear(64, 4))
+        self.offset = nn.Sequential(linear(channels, 64), nn.ReLU(inplace=True), nn.Linear(64, 4))
 
     def forward(
         self, motion: torch.Tensor, base: torch.Tensor, place: torch.Tensor

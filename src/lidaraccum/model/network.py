@@ -37,18 +37,24 @@ class FrameFeatures:
 
     Attributes:
         frames: The frames' points and pillars.
-        base: (F, C, S, S) base features, level coordinates, x by row and y by column.
+        maps: Base features, level coordinates, x by row and y by column: (1, C, S, S) of each
+            frame. Frame by frame, for a window of them is too large to be copied together.
         foreground: (V,) float32 logits of the occupied pillars: on something that can move.
-        ego: The background pillars that speak for each frame.
+        ego: The background pillars that speak for each frame; none where nobody is to match them.
     """
 
     frames: FrameTensors
-    base: torch.Tensor
+    maps: tuple[torch.Tensor, ...]
     foreground: torch.Tensor
     ego: EgoPillars
 
     def __len__(self) -> int:
         return len(self.frames)
+
+    @property
+    def base(self) -> torch.Tensor:
+        """(F, C, S, S): the maps in one tensor, a copy."""
+        return torch.cat(self.maps)
 
     def select(self, index: int) -> FrameFeatures:
         """One of the frames alone."""
@@ -56,9 +62,9 @@ class FrameFeatures:
         own = slice(first, first + self.frames.pillar_counts[index])
         return FrameFeatures(
             self.frames.select(index),
-            self.base[index : index + 1],
+            self.maps[index : index + 1],
             self.foreground[own],
-            self.ego.pick(torch.tensor([index], device=self.base.device)),
+            self.ego.pick(torch.tensor([index], device=self.foreground.device)),
         )
 
     @staticmethod
@@ -66,7 +72,7 @@ class FrameFeatures:
         """Several put one after another; their grids must be the same."""
         return FrameFeatures(
             FrameTensors.stack([part.frames for part in parts]),
-            torch.cat([part.base for part in parts]),
+            tuple(one for part in parts for one in part.maps),
             torch.cat([part.foreground for part in parts]),
             EgoPillars.stack([part.ego for part in parts]),
         )
@@ -87,7 +93,8 @@ class Perception:
         dynamic: (Q,) logit: on something that does move.
         offset: (Q, 2) metres, x and y from the position to its object's centre in the target
             frame, level axes.
-        feature: (Q, D) motion features.
+        features: Motion features (q, D) of the points of each frame, apart: they are large, and few
+            are asked for again.
         base: (Q, C) base features of the point's own frame.
         seconds: (Q,) of the point's frame from the target.
     """
@@ -99,9 +106,19 @@ class Perception:
     foreground: torch.Tensor
     dynamic: torch.Tensor
     offset: torch.Tensor
-    feature: torch.Tensor
+    features: tuple[torch.Tensor, ...]
     base: torch.Tensor
     seconds: torch.Tensor
+
+    @property
+    def feature(self) -> torch.Tensor:
+        """(Q, D): the features in one tensor, a copy."""
+        return torch.cat(self.features)
+
+    def features_of(self, chosen: torch.Tensor) -> torch.Tensor:
+        """(K, D) features of the points that are chosen (Q,), in order."""
+        parts = torch.split(chosen, [len(one) for one in self.features])
+        return torch.cat([one[own] for one, own in zip(self.features, parts, strict=True)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +153,9 @@ class Network(nn.Module):
         self.pillars = PillarEncoder(settings)
         self.backbone = UNet(width, settings.base_widths)
         scores = nn.Conv2d(width, 1, 3, padding=1)
-        self.foreground_head = nn.Sequential(convolution(width, width), nn.ReLU(), scores)
+        self.foreground_head = nn.Sequential(
+            convolution(width, width), nn.ReLU(inplace=True), scores
+        )
         nn.init.constant_(cast("torch.Tensor", scores.bias), RARE)
         self.ego_head = EgoHead(settings)
         self.matcher = Matcher(settings)
@@ -144,24 +163,34 @@ class Network(nn.Module):
         self.point_head = PointHead(settings)
         self.tube_net = TubeNet(settings)
 
-    def encode(self, frames: FrameTensors, choice: int = 0) -> FrameFeatures:
+    def encode(
+        self, frames: FrameTensors, choice: int = 0, *, matchable: bool = True
+    ) -> FrameFeatures:
         """Features of F frames, each by itself.
 
         Args:
             frames: From `batch.to_tensors`.
             choice: Another number draws other background pillars (training).
+            matchable: Whether somebody is to match them; else no background pillars are drawn.
         """
         base = self.backbone(self.pillars(frames))
         scores = self.foreground_head(base).float()[:, 0].reshape(-1)
         foreground = scores.index_select(0, frames.pillar_place)
-        index, valid = choose_background(
-            frames, foreground.detach(), self.settings.ego_pillars, choice
-        )
+        if matchable:
+            ego = self._ego(frames, base, foreground.detach(), choice)
+        else:
+            ego = EgoPillars.none(frames.level_from_sensor, self.settings.ego_channels)
+        return FrameFeatures(frames, base.split(1), foreground, ego)
+
+    def _ego(
+        self, frames: FrameTensors, base: torch.Tensor, foreground: torch.Tensor, choice: int
+    ) -> EgoPillars:
+        count = self.settings.ego_pillars
+        index, valid = choose_background(frames, foreground, count, choice)
         owner = torch.arange(len(frames), device=index.device)[:, None].expand_as(index)
         cell = frames.pillar_cell[index]
         feature = self.ego_head(base, owner.reshape(-1), cell.reshape(-1)).view(*index.shape, -1)
-        ego = EgoPillars(frames.pillar_mean[index], feature, valid, frames.level_from_sensor)
-        return FrameFeatures(frames, base, foreground, ego)
+        return EgoPillars(frames.pillar_mean[index], feature, valid, frames.level_from_sensor)
 
     def match(self, source: FrameFeatures, target: FrameFeatures, gap_s: torch.Tensor) -> EgoMatch:
         """Proposed poses target_from_source of B pairs of frames, ``gap_s`` (B,) seconds apart."""
@@ -174,7 +203,7 @@ class Network(nn.Module):
         targets' neighbours are matched first, within all reach; each further frame is matched to
         the target too, but from where steady motion of the nearer ones puts it.
         """
-        device = features.base.device
+        device = features.foreground.device
         stamps = features.frames.stamps
         gaps = torch.tensor(windows.gaps(stamps), device=device).float()
         known = torch.eye(4, device=device).repeat(len(features), 1, 1)
@@ -211,12 +240,12 @@ class Network(nn.Module):
             features: Of all frames of all windows, window by window, in order of time.
             target_from_frame: (F, 4, 4) poses, sensor coordinates: the caller's.
             windows: Which frames make which window.
-            points: (Q,) int64 the points to look at; `close_points` when None.
+            points: (Q,) int64, ascending: the points to look at; `close_points` when None.
             detach: Keep the motion branch's gradient out of the base features.
         """
         frames = features.frames
-        device = features.base.device
-        base = features.base.detach() if detach else features.base
+        device = features.foreground.device
+        base = [one.detach() if detach else one for one in features.maps]
         owner = torch.tensor(windows.target_of_frame, device=device)
         level = chain(
             frames.level_from_sensor[owner],
@@ -230,24 +259,43 @@ class Network(nn.Module):
         frame = frames.point_frame[point]
         xyz = frames.points[point]
         position = move(level[frame], xyz[:, None])[:, 0]
-        window = torch.tensor(windows.of_frame, device=device)[frame]
         seconds = torch.tensor(windows.gaps(frames.stamps), device=device).float()[frame]
-        own_base = read(base, frame, xyz[:, :2], half)
-        motion = read(motion_map, window, position[:, :2], half)
+        counts = torch.bincount(frame, minlength=len(frames)).tolist()
         centre = frames.pillar_centres()[frames.pillar[point]]
-        place = torch.cat(
+        told = torch.cat(
             [
+                xyz[:, :2],
+                position[:, :2],
                 (xyz[:, :2] - centre) / frames.pillar_m,
                 frames.height[point, None],
                 seconds[:, None],
             ],
             dim=1,
         )
-        feature, foreground, dynamic, offset = self.point_head(motion, own_base, place)
+        said = [
+            self._say(one, motion_map[window : window + 1], own, half)
+            for one, window, own in zip(
+                base, windows.of_frame, torch.split(told, counts), strict=True
+            )
+        ]
+        feature, *others = zip(*said, strict=True)
+        foreground, dynamic, offset, own_base = map(torch.cat, others)
         return Perception(
             windows, point, frame, position, foreground, dynamic, offset,
             feature, own_base, seconds,
         )  # fmt: skip
+
+    def _say(
+        self, base: torch.Tensor, motion_map: torch.Tensor, told: torch.Tensor, half_extent_m: float
+    ) -> tuple[torch.Tensor, ...]:
+        """What `PointHead` says of one frame's points, and the base features that they read.
+
+        A point is told (Q, 8) by x and y in its frame, x and y ego-aligned, and its `place` there.
+        """
+        xy, aligned_xy, place = torch.split(told, [2, 2, 4], dim=1)
+        own = read(base, xy, half_extent_m)
+        motion = read(motion_map, aligned_xy, half_extent_m)
+        return (*self.point_head(motion, own, place), own)
 
     def track(self, perception: Perception, instance: torch.Tensor) -> ObjectMotions:
         """Proposed motions of objects whose points the caller knows.
@@ -274,7 +322,9 @@ class Network(nn.Module):
             target[window],
             len(ids),
         )
-        motions = self.tube_net(tubes, perception.feature[chosen], perception.base[chosen])
+        motions = self.tube_net(
+            tubes, perception.features_of(instance > 0), perception.base[chosen]
+        )
         return ObjectMotions(
             ids=ids,
             window=window,

@@ -30,8 +30,8 @@ class PillarEncoder(nn.Module):
 
     def forward(self, frames: FrameTensors) -> torch.Tensor:
         """Encode F frames."""
-        hidden = torch.relu(self.inner(_point_features(frames)))
-        hidden = torch.relu(self.outer(hidden))  # (P, C')
+        hidden = torch.relu_(self.inner(_point_features(frames)))
+        hidden = self.outer(hidden)  # (P, C'); the maximum holds the ReLU
         pooled = tallest(hidden, frames.pillar, len(frames.pillar_cell))
         pillars = self.project(self.normalise(pooled).to(hidden.dtype))  # (V, C)
         canvas = pillars.new_zeros(len(frames) * frames.cells * frames.cells, pillars.shape[1])
@@ -47,12 +47,7 @@ def _point_features(frames: FrameTensors) -> torch.Tensor:
     ).index_select(0, frames.pillar)
     xy = frames.points[:, :2]
     height = frames.height[:, None]
-    return torch.cat(
-        [
-            (xy - home[:, 0:2]) / frames.pillar_m,
-            (xy - home[:, 2:4]) / frames.pillar_m,
-            (height - home[:, 4:5]) / _HEIGHT_SCALE_M,
-            height / _HEIGHT_SCALE_M,
-        ],
-        dim=1,
-    )
+    told = torch.cat([xy, xy, height, height], dim=1)
+    told[:, :5] -= home
+    measures = [frames.pillar_m] * 4 + [_HEIGHT_SCALE_M] * 2
+    return told.div_(told.new_tensor(measures))

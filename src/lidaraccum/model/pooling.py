@@ -8,10 +8,10 @@ import torch
 
 
 def tallest(values: torch.Tensor, slot: torch.Tensor, count: int) -> torch.Tensor:
-    """Maximum (count, C) over the values (Q, C), 0 or more, of each slot; 0 where there is none.
+    """Maximum (count, C) over 0 and the values (Q, C) of each slot: a ReLU is in it.
 
     Args:
-        values: (Q, C), none negative: after a ReLU.
+        values: (Q, C).
         slot: (Q,) int64, 0..count-1.
         count: Number of slots.
     """
@@ -23,7 +23,7 @@ class _Tallest(torch.autograd.Function):
     """Each of several equally tall values gets the whole gradient.
 
     Sharing it out, as automatic differentiation does, means counting them: five times the work.
-    Where it matters they are all 0, and the ReLU before stops it.
+    Ties matter only at 0, and there no value is one by chance.
     """
 
     @staticmethod

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,6 +24,10 @@ from lidaraccum.model.weights import weights_hash
 
 FEWEST_POINTS = 50
 """A frame with fewer points on the grid has nothing to say."""
+
+
+MOST_TO_TRACK = 200
+"""So many points of an object speak for its motion in a frame; of more, every second or third."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +54,9 @@ class _Kept:
 
 class NetworkReader:
     """A network that reads frames one by one and windows of them together.
+
+    It works in one thread: where cores are busy, and a machine that has many drives to do keeps
+    them so, two threads wait for each other and take three to eight times as long as one.
 
     Args:
         network: Whose answers; it is put into evaluation mode.
@@ -82,8 +90,9 @@ class NetworkReader:
             return EncodedFrame(len(frame), None)
         if len(prepared.points) < FEWEST_POINTS:
             return EncodedFrame(len(frame), None)
-        with torch.inference_mode(), inference():
-            return EncodedFrame(len(frame), self._network.encode(to_tensors([prepared])))
+        with _answering():
+            features = self._network.encode(to_tensors([prepared]), matchable=False)
+            return EncodedFrame(len(frame), features)
 
     def look(
         self,
@@ -106,7 +115,7 @@ class NetworkReader:
         target = min(places, key=lambda place: abs(place - target))
         features = FrameFeatures.stack([one.features for one in encoded if one.features])
         poses = rigid.invert(world_from_sensor[target]) @ world_from_sensor[places]
-        with torch.inference_mode(), inference():
+        with _answering():
             seen = self._network.perceive(
                 features,
                 torch.from_numpy(poses.astype(np.float32)),
@@ -149,10 +158,10 @@ class NetworkReader:
         ids = np.zeros(len(rows), dtype=np.int64)
         for order, place in enumerate(places):
             own = frame == order
-            ids[own] = instances[place][rows[own]]
+            ids[own] = thinned(instances[place][rows[own]])
         if not ids.any():
             return self.track(replace(reading, kept=None), instances)
-        with torch.inference_mode(), inference():
+        with _answering():
             objects = self._network.track(seen, torch.from_numpy(ids))
         sensor_from_level = _sensor_from_level(kept.features, places.index(reading.target))
         motions = sensor_from_level @ to_arrays(objects.target_from_aligned)
@@ -165,6 +174,27 @@ class NetworkReader:
         visible[:, shown] = counts > 0
         anchor = np.array(places)[to_indices(objects.tubes.anchor_time)]
         return ObjectReading(to_indices(objects.ids), anchor, visible, target_from_aligned)
+
+
+@contextmanager
+def _answering() -> Iterator[None]:
+    """No gradients, the fastest arithmetic, one thread; the caller's threads are given back."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        with torch.inference_mode(), inference():
+            yield
+    finally:
+        torch.set_num_threads(threads)
+
+
+def thinned(ids: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Ids (Q,) of points, 0 for none, with 0 for those that are not needed to track an object."""
+    kept = np.zeros_like(ids)
+    for one, count in zip(*np.unique(ids[ids > 0], return_counts=True), strict=True):
+        own = np.flatnonzero(ids == one)
+        kept[own[:: -(-count // MOST_TO_TRACK)]] = one
+    return kept
 
 
 def _sensor_from_level(features: FrameFeatures, order: int) -> rigid.Pose:

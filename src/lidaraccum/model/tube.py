@@ -116,19 +116,23 @@ class TubeNet(nn.Module):
     def __init__(self, settings: NetworkSettings) -> None:
         super().__init__()
         wide = settings.tube_channels
-        self.motion = nn.Sequential(linear(settings.point_channels, 64), nn.ReLU())
-        self.ego = nn.Sequential(linear(settings.base_widths[0], 64), nn.ReLU())
+        self.motion = nn.Sequential(linear(settings.point_channels, 64), nn.ReLU(inplace=True))
+        self.ego = nn.Sequential(linear(settings.base_widths[0], 64), nn.ReLU(inplace=True))
         self.place = nn.Sequential(
-            linear(4, 64), nn.ReLU(), linear(64, wide), nn.ReLU(), linear(wide, wide)
+            linear(4, 64),
+            nn.ReLU(inplace=True),
+            linear(64, wide),
+            nn.ReLU(inplace=True),
+            linear(wide, wide),
         )
         # Normalised, for what comes in is metres: unbounded signals had killed every unit.
         self.regress = nn.Sequential(
             linear(128 + 2 * wide + 4, 256),
             nn.LayerNorm(256),
-            nn.ReLU(),
+            nn.ReLU(inplace=True),
             linear(256, 128),
             nn.LayerNorm(128),
-            nn.ReLU(),
+            nn.ReLU(inplace=True),
         )
         self.last = nn.Linear(128, 8)
         nn.init.normal_(self.last.weight, std=1e-5)

@@ -42,8 +42,8 @@ class _Down(nn.Module):
         self.refine = convolution(outputs, outputs)
 
     def forward(self, fine: torch.Tensor) -> torch.Tensor:
-        coarse = torch.relu(self.halve(fine))
-        return torch.relu(self.refine(coarse) + coarse)
+        coarse = torch.relu_(self.halve(fine))
+        return torch.relu_(self.refine(coarse).add_(coarse))
 
 
 class _Up(nn.Module):
@@ -54,7 +54,7 @@ class _Up(nn.Module):
 
     def forward(self, coarse: torch.Tensor, skipped: torch.Tensor) -> torch.Tensor:
         wide = nn.functional.interpolate(self.narrow(coarse), scale_factor=2.0, mode="nearest")
-        return self.refine(torch.relu(wide + skipped))
+        return self.refine(torch.relu_(wide.add_(skipped)))
 
 
 class UNet(nn.Module):
@@ -76,8 +76,11 @@ class UNet(nn.Module):
         self.normalise = nn.LayerNorm(widths[0], eps=FAINT)
 
     def forward(self, maps: torch.Tensor) -> torch.Tensor:
-        """Features at the resolution of the maps."""
-        level = torch.relu(self.stem(maps))
+        """Features at the resolution of the maps.
+
+        Sums and ReLUs are in place, as elsewhere: fresh memory costs more than they do.
+        """
+        level = torch.relu_(self.stem(maps))
         skipped: list[torch.Tensor] = []
         for down in self.downs:
             skipped.append(level)

@@ -67,6 +67,7 @@ class Track:
     last_index: int = -1
     last_stamp: float = -np.inf
     points: int = 0
+    most_points: int = 0
 
     @property
     def expectation(self) -> Expectation:
@@ -135,7 +136,7 @@ def _same(found: WindowObject, tracks: Sequence[Track]) -> Track | None:
         if np.linalg.norm(track.expectation.centre_at(found.stamp) - found.centre) > FAR_M:
             continue
         shares = [
-            len(np.intersect1d(picked, track.picked[index]))
+            len(np.intersect1d(picked, track.picked[index], assume_unique=True))
             / min(len(picked), len(track.picked[index]))
             for index, picked in found.picked.items()
             if index in track.picked

@@ -13,7 +13,7 @@ from lidaraccum.data.registered import RegisteredFrame
 from lidaraccum.geometry import rigid
 from lidaraccum.geometry.clustering import connected_cells
 from lidaraccum.geometry.terrain import estimate_terrain
-from lidaraccum.geometry.visibility import RangeView, elevation_gap
+from lidaraccum.geometry.visibility import MIN_RANGE_M, RangeView, elevation_gap
 from lidaraccum.pipeline.motion_settings import MotionSettings
 
 HEIGHT_WEIGHT = 0.5
@@ -40,8 +40,10 @@ class SightedFrame:
         view: What its rays passed through.
         rows: (M,) int64: the obstacles' rows among the frame's points.
         low_rows: (L,) int64: rows of points lower than obstacles but above the ground.
+        close_rows: (C,) int64: rows of points that stand so close that they may be the carrier.
         near_points: (M + L, 3) float64, metres, sensor coordinates: obstacles, then low points.
         near_heights: (M + L,) metres above the ground.
+        close_points: (C, 3) float64, metres, sensor coordinates.
         seconds: (M,) after the stamp, when each obstacle was met; 0 where nothing tells.
         segments: (M,) int64: each obstacle's cluster within this frame.
         segment_sizes: (S,) obstacles in each cluster.
@@ -56,22 +58,29 @@ class SightedFrame:
         viewpoint: NDArray[np.float64] | None = None,
     ) -> None:
         points = registered.frame.points
-        beyond = np.abs(points).max(axis=1) > FARTHEST_ECHO_M
-        # What no sensor can have seen counts as no return: it would stretch every grid.
-        points = np.where(beyond[:, None], np.float32(0), points) if beyond.any() else points
+        if np.abs(points).max(initial=0.0) > FARTHEST_ECHO_M:
+            # What no sensor can have seen counts as no return: it would stretch every grid.
+            beyond = np.abs(points).max(axis=1) > FARTHEST_ECHO_M
+            points = np.where(beyond[:, None], np.float32(0), points)
         self.registered = registered
         self.viewpoint = np.zeros(3) if viewpoint is None else viewpoint
-        rays = points - self.viewpoint
+        rays = points - self.viewpoint.astype(np.float32)
         self.gap = elevation_gap(rays)
         self.view = RangeView(points, self.gap, self.viewpoint)
         heights = estimate_terrain(points).height_above(points)
-        outside = np.einsum("ij,ij->i", rays, rays) > settings.min_range_m**2
-        standing = outside & (heights < settings.max_height_m)
+        squared = np.einsum("ij,ij->i", rays, rays)
+        outside = squared > settings.min_range_m**2
+        low_enough = heights < settings.max_height_m
+        standing = outside & low_enough
         obstacle = heights >= settings.min_height_m
         self.rows = np.flatnonzero(standing & obstacle)
         self.low_rows = np.flatnonzero(
             standing & ~obstacle & (heights > LOW_SHARE * settings.min_height_m)
         )
+        self.close_rows = np.flatnonzero(
+            ~outside & low_enough & obstacle & (squared > MIN_RANGE_M**2)
+        )
+        self.close_points = points[self.close_rows].astype(np.float64)
         near = np.concatenate([self.rows, self.low_rows])
         self.near_points = points[near].astype(np.float64)
         self.near_heights = heights[near]
@@ -131,13 +140,26 @@ class SightedFrame:
             points: (N, 3) metres, sensor coordinates.
             heights: (N,) metres above the ground: hills do not part what is one thing.
         """
-        spacing = self.gap * np.hypot(points[:, 0], points[:, 1])
-        weight = np.minimum(HEIGHT_WEIGHT, BEAM_ALLOWANCE_M / np.maximum(spacing, 1e-3))
-        return np.column_stack([points[:, 0], points[:, 1], weight * heights])
+        x, y = points[:, 0], points[:, 1]
+        return np.column_stack([x, y, self.height_weight(x, y) * heights])
+
+    def height_weight(self, x: NDArray[Any], y: NDArray[Any]) -> NDArray[np.float64]:
+        """What heights count in distances, (...) each, at x and y (...), sensor coordinates."""
+        spacing = self.gap * np.sqrt(x * x + y * y)
+        return np.minimum(HEIGHT_WEIGHT, BEAM_ALLOWANCE_M / np.maximum(spacing, 1e-3))
 
     def world(self, picked: NDArray[np.int64]) -> NDArray[np.float64]:
         """Some of the obstacles (K,) in the world, (K, 3) metres."""
-        return rigid.transform(self.world_from_sensor, self.points[picked])
+        return self._world.take(picked, axis=0)
+
+    @cached_property
+    def _world(self) -> NDArray[np.float64]:
+        return rigid.transform(self.world_from_sensor, self.points)
+
+    @cached_property
+    def _columns(self) -> NDArray[np.float32]:
+        """The obstacles (M, 3), sensor coordinates, laid out column by column."""
+        return np.asfortranarray(self.points, dtype=np.float32)
 
     def world_at_stamp(
         self, picked: NDArray[np.int64], velocity: NDArray[np.float64]
@@ -149,7 +171,11 @@ class SightedFrame:
         """When after the stamp the sweep passed points (N, 3), sensor coordinates: (N,) seconds."""
         if not self.is_timed:
             return np.zeros(len(points))
-        return self._seconds_by_azimuth[_azimuth_bins(points - self.viewpoint)]
+        return self.seconds_toward(points[:, 0], points[:, 1])
+
+    def seconds_toward(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """As `seconds_at` where `is_timed`, for x and y (...) each: (...) seconds."""
+        return self._seconds_by_azimuth[_azimuth_bins(x - self.viewpoint[0], y - self.viewpoint[1])]
 
     @cached_property
     def is_timed(self) -> bool:
@@ -158,7 +184,8 @@ class SightedFrame:
 
     @cached_property
     def _seconds_by_azimuth(self) -> NDArray[np.float64]:
-        bins = _azimuth_bins(self.points - self.viewpoint)
+        x, y = self.level
+        bins = _azimuth_bins(x - self.viewpoint[0], y - self.viewpoint[1])
         counts = np.bincount(bins, minlength=AZIMUTH_BINS)
         sums = np.bincount(bins, self.seconds, minlength=AZIMUTH_BINS)
         full = np.flatnonzero(counts)
@@ -170,18 +197,33 @@ class SightedFrame:
         nearest = np.where(about[after] - wanted < wanted - about[before], after, before)
         return np.asarray(means[nearest])
 
+    def about(self, centre: NDArray[np.float64], reach_m: float) -> NDArray[np.int64]:
+        """The obstacles (K,) in the level square so far about a place (3,) in the world."""
+        here = self.sensor_from_world[:3] @ np.append(centre, 1.0)
+        (x, y), (east, north) = self.level, here[:2]
+        near = (x > east - reach_m) & (x < east + reach_m)
+        near &= (y > north - reach_m) & (y < north + reach_m)
+        return np.flatnonzero(near)
+
     def world_of_near(self) -> NDArray[np.float64]:
         """Obstacles and low points in the world, (M + L, 3) metres."""
         return rigid.transform(self.world_from_sensor, self.near_points)
 
+    @property
+    def low_points(self) -> NDArray[np.float64]:
+        """(L, 3) the low points, metres, sensor coordinates."""
+        return self.near_points[len(self.rows) :]
+
     def watch(self, other: SightedFrame) -> None:
         """Count what this frame saw at the other frame's obstacles."""
         sensor_from_other = self.sensor_from_world @ other.world_from_sensor
-        sighting = self.view.look(rigid.transform(sensor_from_other, other.points))
+        sighting = self.view.look(other._columns, sensor_from_other)
         other.through += sighting.through
         other.met += sighting.met
 
 
-def _azimuth_bins(points: NDArray[np.float64]) -> NDArray[np.int64]:
-    turns = np.arctan2(points[:, 1], points[:, 0]) / (2 * np.pi)
-    return np.asarray((turns * AZIMUTH_BINS).astype(np.int64) % AZIMUTH_BINS)
+def _azimuth_bins(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
+    angle = np.arctan2(y.astype(np.float32), x.astype(np.float32))
+    bins = (angle * np.float32(AZIMUTH_BINS / (2 * np.pi))).astype(np.int64)
+    bins[bins < 0] += AZIMUTH_BINS
+    return bins

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from lidaraccum.geometry import rigid
 from lidaraccum.geometry.clustering import connected_cells
 from lidaraccum.geometry.voxel import thin
 from lidaraccum.pipeline.courses import carried, turned
@@ -120,8 +120,11 @@ def _points_at(
     if len(about) == 0:
         return about
     own = frame.places(frame.points[about], frame.heights[about])
-    distance, _ = cKDTree(places).query(own, distance_upper_bound=JOIN_M)
+    tree = cKDTree(places, balanced_tree=False, compact_nodes=False)
+    distance, _ = tree.query(own, distance_upper_bound=JOIN_M)
     close = about[np.isfinite(distance)]
+    if len(close) == 0:
+        return close
     sizes = frame.segment_sizes
     shares = np.bincount(frame.segments[close], minlength=len(sizes)) / sizes
     whole = (shares > WHOLE_SHARE) & (sizes < WHOLE_GROWTH * len(places))
@@ -137,10 +140,12 @@ def without_standing(
     settings: MotionSettings,
     stamp: float,
     turn: float = 0.0,
+    margin: float = STANDING_MARGIN,
 ) -> dict[int, NDArray[np.int64]]:
     """The mover's points less what stands and only touches it (a parked car it passes).
 
-    Its velocity (3,) is that at ``stamp``, its rate of turn in radians a second.
+    Its velocity (3,) is that at ``stamp``, its rate of turn in radians a second. What stands costs
+    less by a ``margin``, standing; with a negative one, even what costs a little more does.
     """
     kept = {}
     for frame in frames:
@@ -156,9 +161,10 @@ def without_standing(
             )
             rivals = np.stack([np.zeros(3), turned(velocity, turn * (frame.stamp - stamp))])
             cost, _ = judge_points(template, rivals, frames, settings, np.array([0.0, turn]))
-            stands = cost[0] + STANDING_MARGIN < cost[1]
-            _, nearest = cKDTree(frame.points[sample]).query(frame.points[doubtful])
-            mine = np.setdiff1d(mine, doubtful[stands[nearest]])
+            stands = cost[0] + margin < cost[1]
+            if stands.any():
+                _, nearest = cKDTree(frame.points[sample]).query(frame.points[doubtful])
+                mine = np.setdiff1d(mine, doubtful[stands[nearest]])
         if len(mine):
             kept[frame.index] = mine
     return kept
@@ -170,45 +176,73 @@ def with_middle(
     frames: Sequence[SightedFrame],
     stamp: float,
     turn: float,
+    most_growth: float = np.inf,
 ) -> dict[int, NDArray[np.int64]]:
     """A mover's points and what lies between them in their clusters, unless it is seen to stand.
 
     A long side that slides along itself is seen through at its ends only. What stands is seen there
-    when the mover is elsewhere.
+    when the mover is elsewhere. Nothing is added that has ``most_growth`` times its points.
     """
     shown = [frame for frame in frames if len(picked.get(frame.index, ()))]
-    axes = {}
+    boxes = {}
     for frame in shown:
         there = turned(velocity, turn * (frame.stamp - stamp))[:2]
-        ahead = there / np.linalg.norm(there)
-        axes[frame.index] = np.array([ahead, [-ahead[1], ahead[0]]]).T
+        boxes[frame.index] = _Box.about(frame.world(picked[frame.index]), there)
     filled = dict(picked)
     for frame in shown:
         mine = picked[frame.index]
-        near = np.flatnonzero(np.isin(frame.segments, np.unique(frame.segments[mine])))
-        near = np.setdiff1d(near, mine)
+        near = _others_of_clusters(frame, mine)
         world = frame.world(near)
-        inside = _in_box(world, frame.world(mine), axes[frame.index], 0.0)
+        inside = boxes[frame.index].holds(world, 0.0)
         near, world = near[inside], world[inside]
+        if not 0 < len(near) < most_growth * len(mine):
+            continue
         balance = 0
         for other in shown:
             if other is not frame:
-                own = other.world(picked[other.index])
-                left = world[~_in_box(world, own, axes[other.index], BOX_MARGIN_M)]
-                seen = other.view.look(rigid.transform(other.sensor_from_world, left))
-                balance += int(seen.through.sum()) - int(seen.met.sum())
-        if len(near) and balance >= 0:
+                left = world[~boxes[other.index].holds(world, BOX_MARGIN_M)]
+                if len(left):
+                    seen = other.view.look(left, other.sensor_from_world)
+                    balance += int(seen.through.sum()) - int(seen.met.sum())
+        if balance >= 0:
             filled[frame.index] = np.union1d(mine, near)
     return filled
 
 
-def _in_box(
-    points: NDArray[np.float64],
-    own: NDArray[np.float64],
-    axes: NDArray[np.float64],
-    margin_m: float,
-) -> NDArray[np.bool_]:
-    """Which points (N, 3) lie in the level box of others (M, 3) along axes (2, 2), world."""
-    place, held = points[:, :2] @ axes, own[:, :2] @ axes
-    low, high = held.min(axis=0) - margin_m, held.max(axis=0) + margin_m
-    return np.asarray(((place >= low) & (place <= high)).all(axis=1))
+def _others_of_clusters(frame: SightedFrame, picked: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The obstacles of the picked ones' clusters that are not picked themselves."""
+    cluster = np.zeros(len(frame.segment_sizes), dtype=np.bool_)
+    cluster[frame.segments[picked]] = True
+    near = cluster[frame.segments]
+    near[picked] = False
+    return np.flatnonzero(near)
+
+
+@dataclass(frozen=True, eq=False)
+class _Box:
+    """A level box in the world.
+
+    Attributes:
+        axes: (2, 2) columns: unit vectors along it and across.
+        low: (2,) metres along the axes.
+        high: (2,) as well.
+    """
+
+    axes: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+    @classmethod
+    def about(cls, points: NDArray[np.float64], along: NDArray[np.float64]) -> _Box:
+        """The box of points (N, 3), world, along a direction (2,)."""
+        ahead = along / np.linalg.norm(along)
+        axes = np.array([ahead, [-ahead[1], ahead[0]]]).T
+        held = points[:, :2] @ axes
+        return cls(axes, held.min(axis=0), held.max(axis=0))
+
+    def holds(self, points: NDArray[np.float64], margin_m: float) -> NDArray[np.bool_]:
+        """Which points (N, 3), world, lie in it, grown by a margin."""
+        along, across = (points[:, :2] @ self.axes).T
+        low, high = self.low - margin_m, self.high + margin_m
+        inside = (along >= low[0]) & (along <= high[0])
+        return inside & (across >= low[1]) & (across <= high[1])

@@ -20,7 +20,7 @@ SIZE_RATIO = 4.0
 """Two clusters with more than so many times the other's points are not one thing."""
 
 VOTE_BIN_M = 0.1
-VOTE_REACH_M = 4.0
+VOTE_REACH_M = 8.0
 VOTE_PEAKS = 2
 VOTE_POINTS = 60
 VOTE_HEIGHT_M = 0.3

@@ -6,13 +6,15 @@ from dataclasses import dataclass, replace
 
 from lidaraccum.errors import SettingsError
 
-SURE = 0.8
+SURE = 0.5
 TRUSTED_MARGIN = 0.2
 TRUSTED_COST = 0.65
 TRUSTED_SHARE = 0.85
 TRUSTED_WAY = 0.5
+TRUSTED_SHOWN = 0.08
 """Where a proposer is so sure that something moves, this share of the margin is enough and this
-cost is allowed if it is less than this share of standing still; so is this share of the way."""
+cost is allowed if it is less than this share of standing still; so is this share of the way. So
+much of it must be shown, not hidden: a wall that comes into view may have come from anywhere."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,9 @@ class MotionSettings:
         max_share: Nor does one that costs more than this share of what standing still costs.
         min_through: Share of its points that the other frames must have seen through, were it
             standing still.
+        shown: Or so much more must standing still cost where nothing is hidden: what creeps is
+            never seen through.
+        min_shown: And at least so much.
         sure_margin: With so much margin one window is enough; with less, two must agree.
         box_growth: A mover takes all that is inside the box of what it has shown, unless that
             makes so many times its points.
@@ -64,6 +69,8 @@ class MotionSettings:
     max_cost: float = 0.5
     max_share: float = 1.0
     min_through: float = 0.15
+    shown: float = 0.3
+    min_shown: float = 0.0
     sure_margin: float = 0.5
     box_growth: float = 1.5
 
@@ -88,6 +95,7 @@ class MotionSettings:
             max_share=TRUSTED_SHARE,
             min_shift_m=TRUSTED_WAY * self.min_shift_m,
             min_through=-1.0,
+            min_shown=TRUSTED_SHOWN,
         )
 
 

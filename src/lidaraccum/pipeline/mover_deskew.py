@@ -99,7 +99,7 @@ def _undone(
             continue
         object_from_sensor = rigid.invert(now.world_from_object) @ registered.world_from_sensor
         own = rigid.transform(object_from_sensor, points[now.rows])
-        if np.linalg.norm(np.cross(rate[:3], own.mean(axis=0)) + rate[3:]) > max_speed_mps:
+        if np.linalg.norm(rigid.crossed(rate[:3], own.mean(axis=0)) + rate[3:]) > max_speed_mps:
             continue
         own = transform_along(-rate, seconds[now.rows], own)
         points[now.rows] = rigid.transform(rigid.invert(object_from_sensor), own)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, Future
 from typing import Any
 
 import numpy as np
@@ -29,25 +30,37 @@ STILL_POINTS = 10
 
 
 class NetworkAdvice:
-    """Proposes what the network takes for moving; names what it takes for movable and stands."""
+    """Proposes what the network takes for moving; names what it takes for movable and stands.
 
-    def __init__(self, reader: Reader, settings: MotionSettings, ids: ObjectIds) -> None:
+    Args:
+        reader: The network.
+        settings: What counts as a mover.
+        ids: Where the ids of what stands come from.
+        worker: Encodes frames, one after another, while the next are registered: nobody asks for
+            them before the window is full. What encoding raises is raised then.
+    """
+
+    def __init__(
+        self, reader: Reader, settings: MotionSettings, ids: ObjectIds, worker: Executor
+    ) -> None:
         self._reader = reader
+        self._worker = worker
         self._settings = settings
         self._still = StillObjects(ids)
-        self._encoded: dict[int, Any] = {}
+        self._encoded: dict[int, Future[Any]] = {}
         self._readings: dict[int, FrameReading] = {}
         self._tubes: list[Tube] = []
         self._next_unread = 0
 
     def see(self, frame: SightedFrame) -> None:
-        """Encode the frame."""
-        self._encoded[frame.index] = self._reader.read(frame.registered.frame)
+        """Have the frame encoded."""
+        encoded = self._worker.submit(self._reader.read, frame.registered.frame)
+        self._encoded[frame.index] = encoded
 
     def leads(self, window: Sequence[SightedFrame]) -> list[Lead]:
         """What the network sees moving, where the window shows it, the largest first."""
         for run in self._unread_runs(window):
-            encoded = [self._encoded[frame.index] for frame in run]
+            encoded = [self._encoded[frame.index].result() for frame in run]
             poses = np.stack([frame.world_from_sensor for frame in run])
             reading = self._reader.look(encoded, poses, 0)
             for frame, one in zip(run, reading.frames, strict=True):
@@ -92,5 +105,7 @@ class NetworkAdvice:
         self, rows: NDArray[np.int64], level: NDArray[np.float64], canvas: Canvas
     ) -> None:
         instances = canvas.instances(rows)
-        for instance in np.unique(instances[instances > 0]).tolist():
+        moving = instances > 0
+        instances, level = instances[moving], level[moving]
+        for instance in np.unique(instances).tolist():
             self._still.follow(instance, level[instances == instance])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 from lidaraccum.data.perceived import PerceivedFrame
 from lidaraccum.data.registered import RegisteredFrame
@@ -33,5 +34,9 @@ class NetworkLed:
     def perceive(self, frames: Iterable[RegisteredFrame]) -> Iterator[PerceivedFrame]:
         """Each frame once, in order, its movers labelled and placed, what stands named."""
         ids = ObjectIds()
-        advice = NetworkAdvice(self._reader, self._settings, ids)
-        return MoverStream(self._settings, advice, ids).run(frames)
+        worker = ThreadPoolExecutor(max_workers=1)
+        try:
+            advice = NetworkAdvice(self._reader, self._settings, ids, worker)
+            yield from MoverStream(self._settings, advice, ids).run(frames)
+        finally:
+            worker.shutdown(cancel_futures=True)

@@ -11,14 +11,14 @@ from scipy.spatial import cKDTree
 
 from lidaraccum.pipeline.courses import are_alike, turned
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.gathering import gather, without_standing
+from lidaraccum.pipeline.gathering import STANDING_MARGIN, gather, without_standing
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.suspects import Suspect, make_template
 from lidaraccum.pipeline.verdict import (
     Verdict,
     bend_course,
     judge,
-    refine_velocity,
+    refine_velocities,
     slide_velocity,
 )
 
@@ -30,8 +30,27 @@ WORTH_A_BEND = 0.3
 """What costs less on a straight course is not asked whether it turns, nor is what saves less than
 this share of the margin by it; nor is anything where a pose is doubtful: turns explain slips."""
 
+FIRST_MARGIN = 1 / 3
+REFINING_SAVES = 0.3
+"""Motions are given up that after one step of refining save less than this share of the margin or
+cost so much more than a motion may."""
+
 PROBES = 5
 """So many of a longer window's frames, evenly over it, are asked for their verdict."""
+
+FEW_POINTS = 25
+FEW_COST = 0.8
+"""Fewer points than this find partners by chance wherever enough places are tried: they must be
+explained better, a motion may cost this share of what others' may, and are not asked for turns."""
+
+ABOUT_M = 10.0
+GOES_ALONG = 0.03
+"""What stands so near to something that nobody saw through must not go along with it: not by so
+much less cost than standing."""
+
+AS_SENSOR_MPS = 0.5
+AS_SENSOR_SHARE = 0.25
+"""Velocities nearer than this, and this share of its speed, are the sensor's own."""
 
 SAME_GAP_M = 0.8
 SAME_SPEED_MPS = 0.8
@@ -75,6 +94,7 @@ class WindowObject:
         stamp: Seconds.
         margin: How much cheaper this motion is than standing still.
         turn: Radians a second, of it and of its velocity.
+        unseen: Whether too few saw through its place to tell that it moves: by its shape alone.
     """
 
     picked: Mapping[int, NDArray[np.int64]]
@@ -83,6 +103,14 @@ class WindowObject:
     stamp: float
     margin: float
     turn: float = 0.0
+    unseen: bool = False
+
+
+def stands(suspect: Suspect, frames: Sequence[SightedFrame], settings: MotionSettings) -> bool:
+    """Whether standing still explains a suspect so well that no motion could do better."""
+    rough = make_template(frames[suspect.frame], suspect.picked, FIRST_LOOK_POINTS)
+    still = judge(rough, np.zeros((1, 3)), _probes(frames), settings)
+    return bool(still.cost[0] < settings.margin)
 
 
 def explain(
@@ -104,48 +132,101 @@ def explain(
     own = frames[suspect.frame]
     turns = np.zeros(len(proposals)) if turns is None else turns
     still = np.zeros((1, 3))
-    probes = frames[:: max(1, (len(frames) - 1) // (PROBES - 1))]
+    probes = _probes(frames)
     rough = make_template(own, suspect.picked, FIRST_LOOK_POINTS)
-    if len(proposals) == 0 or judge(rough, still, probes, settings).cost[0] < settings.margin:
+    if len(proposals) == 0:
         return None
-    order = np.argsort(judge(rough, proposals, probes, settings, turns).cost, kind="stable")
+    first = judge(
+        rough, np.concatenate([still, proposals]), probes, settings, np.append(0.0, turns)
+    ).cost
+    if first[0] < settings.margin:
+        return None
+    chosen = np.argsort(first[1:], kind="stable")[:REFINED_HYPOTHESES]
+    refined, turns = proposals[chosen], turns[chosen]
+    if not _is_promising(first[1:].min(), first[0], settings):
+        refined = refine_velocities(rough, refined, turns, probes, settings, steps=1)
+        second = judge(rough, refined, probes, settings, turns).cost
+        if not _is_promising(second.min(), first[0], settings):
+            return None
+    refined = refine_velocities(rough, refined, turns, probes, settings)
     template = make_template(own, suspect.picked, TEMPLATE_POINTS)
-    chosen = order[:REFINED_HYPOTHESES]
-    refined = [
-        refine_velocity(rough, proposals[choice], probes, settings, float(turns[choice]))
-        for choice in chosen
-    ]
     rivals = np.concatenate([still, refined])
-    turning = np.concatenate([[0.0], turns[chosen]])
+    turning = np.concatenate([[0.0], turns])
     verdict = judge(template, rivals, probes, settings, turning)
     best = int(verdict.cost.argmin())
     saved = float(verdict.cost[0] - verdict.cost[best])
     if (
         turning[best] == 0
+        and _are_many(suspect)
         and verdict.cost[best] > WELL_EXPLAINED
         and saved > WORTH_A_BEND * settings.margin
         and not any(frame.registered.quality.doubts for frame in frames)
     ):
         bent, turn = bend_course(template, rivals[best], probes, settings)
-        rivals, turning = np.concatenate([rivals, bent[None]]), np.append(turning, turn)
-        verdict = judge(template, rivals, probes, settings, turning)
-        best = int(verdict.cost.argmin())
-    if not _is_motion(best, rivals, verdict, frames, settings):
+        if turn != 0:
+            rivals, turning = np.concatenate([rivals, bent[None]]), np.append(turning, turn)
+            verdict = judge(template, rivals, probes, settings, turning)
+            best = int(verdict.cost.argmin())
+    if not _is_motion(suspect, best, rivals, verdict, frames, settings):
         return None
     turn = float(turning[best])
+    unseen = bool(verdict.through[0] <= max(settings.min_through, 0.0))
+    if unseen and _all_goes_along(suspect, rivals[best], turn, frames, settings):
+        return None
     velocity = slide_velocity(template, rivals[best], probes, settings, turn)
     picked = gather(suspect, velocity, frames, settings, turn)
+    # Where nobody saw through, what it touches and what moves as well as it stands, stands.
+    margin = -STANDING_MARGIN if unseen and settings.min_through >= 0 else STANDING_MARGIN
     return WindowObject(
-        picked=without_standing(picked, velocity, frames, settings, own.stamp, turn),
+        picked=without_standing(picked, velocity, frames, settings, own.stamp, turn, margin),
         velocity=velocity,
         centre=suspect.centre,
         stamp=own.stamp,
         margin=float(verdict.cost[0] - verdict.cost[best]),
         turn=turn,
+        unseen=unseen,
     )
 
 
+def _all_goes_along(
+    suspect: Suspect,
+    velocity: NDArray[np.float64],
+    turn: float,
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+) -> bool:
+    """Whether a motion suits what stands about a suspect, too: then it is a pose that is wrong.
+
+    Nothing that others saw through is asked, so that those who go with it have no say.
+    """
+    own = frames[suspect.frame]
+    about = own.about(suspect.centre, ABOUT_M)
+    stands = (own.met[about] > 0) & (own.through[about] == 0)
+    about = about[stands & ~np.isin(own.segments[about], own.segments[suspect.picked])]
+    if len(about) < TEMPLATE_POINTS:
+        return False
+    template = make_template(own, about, TEMPLATE_POINTS)
+    rivals, turns = np.stack([np.zeros(3), velocity]), np.array([0.0, turn])
+    verdict = judge(template, rivals, _probes(frames), settings, turns)
+    return bool(verdict.shown[1] > GOES_ALONG)
+
+
+def _is_promising(cost: float, standing: float, settings: MotionSettings) -> bool:
+    """Whether a motion that costs so much at first sight may, refined, be one after all."""
+    saved = standing - cost
+    return saved > FIRST_MARGIN * settings.margin and cost < settings.max_cost + REFINING_SAVES
+
+
+def _are_many(suspect: Suspect) -> bool:
+    return len(suspect) >= FEW_POINTS
+
+
+def _probes(frames: Sequence[SightedFrame]) -> Sequence[SightedFrame]:
+    return frames[:: max(1, (len(frames) - 1) // (PROBES - 1))]
+
+
 def _is_motion(
+    suspect: Suspect,
     best: int,
     rivals: NDArray[np.float64],
     verdict: Verdict,
@@ -158,10 +239,35 @@ def _is_motion(
         settings.min_speed_mps < speed < settings.max_speed_mps
         and way > settings.min_shift_m
         and verdict.cost[0] - verdict.cost[best] > settings.margin
-        and verdict.cost[best] < settings.max_cost
+        and verdict.cost[best] < settings.max_cost * (1.0 if _are_many(suspect) else FEW_COST)
         and verdict.cost[best] < settings.max_share * verdict.cost[0]
-        and verdict.through[0] > settings.min_through
+        and verdict.shown[best] > settings.min_shown
+        and (
+            verdict.through[0] > settings.min_through
+            or (
+                verdict.shown[best] > settings.shown
+                and not _goes_as_sensor(suspect, rivals[best], frames)
+            )
+        )
     )
+
+
+def _goes_as_sensor(
+    suspect: Suspect, velocity: NDArray[np.float64], frames: Sequence[SightedFrame]
+) -> bool:
+    """Whether its speed is the sensor's own that way: where beams meet a rail goes along with them.
+
+    Args:
+        suspect: Points of one frame.
+        velocity: (3,) m/s, world, that seems to be theirs.
+        frames: The window.
+    """
+    before = frames[max(suspect.frame - 1, 0)]
+    after = frames[min(suspect.frame + 1, len(frames) - 1)]
+    way = after.world_from_sensor[:3, 3] - before.world_from_sensor[:3, 3]
+    speed = float(np.linalg.norm(velocity))
+    sensor_mps = float(way @ velocity) / speed / (after.stamp - before.stamp)
+    return abs(sensor_mps - speed) < AS_SENSOR_MPS + AS_SENSOR_SHARE * speed
 
 
 def join_parts(
@@ -218,12 +324,25 @@ def _touch(part: WindowObject, whole: WindowObject, frames: Sequence[SightedFram
     for frame in frames:
         if frame.index in part.picked and frame.index in whole.picked:
             some, others = part.picked[frame.index], whole.picked[frame.index]
-            if np.isin(frame.segments[some], frame.segments[others]).any():
+            clusters = np.zeros(len(frame.segment_sizes), dtype=np.bool_)
+            clusters[frame.segments[others]] = True
+            if clusters[frame.segments[some]].any():
                 return True
-            distance, _ = cKDTree(frame.points[others]).query(frame.points[some])
-            if distance.min() < SAME_GAP_M:
+            if _are_near(frame.points[some], frame.points[others]):
                 return True
     return False
+
+
+def _are_near(some: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
+    """Whether some of points (N, 3) are nearer than `SAME_GAP_M` to one of others (M, 3)."""
+    low = np.maximum(some.min(axis=0), others.min(axis=0)) - SAME_GAP_M
+    high = np.minimum(some.max(axis=0), others.max(axis=0)) + SAME_GAP_M
+    some = some[((some >= low) & (some <= high)).all(axis=1)]
+    others = others[((others >= low) & (others <= high)).all(axis=1)]
+    if len(some) == 0 or len(others) == 0:
+        return False
+    distance, _ = cKDTree(others).query(some, distance_upper_bound=SAME_GAP_M)
+    return bool(np.isfinite(distance).any())
 
 
 def _united(whole: WindowObject, part: WindowObject) -> WindowObject:

@@ -48,13 +48,31 @@ class Canvas:
 
     def paint(self, track: Track, picked: NDArray[np.int64], label: int) -> None:
         """Give obstacles (K,), and what is low beside them, to an object."""
-        rows = np.concatenate([self._frame.rows[picked], self._low_beside(picked)])
+        self._paint_rows(
+            track, np.concatenate([self._frame.rows[picked], self._low_beside(picked)]), label
+        )
+
+    def _paint_rows(self, track: Track, rows: NDArray[np.int64], label: int) -> None:
         rows = rows[self._instance[rows] == 0]
         self._label[rows] = label
         self._instance[rows] = track.instance
         self._confidence[rows] = min(1.0, 0.5 + 0.5 * track.margin)
         if label == MOVING:
             self._poses[track.instance] = track.world_from_object
+
+    def paint_close(self, track: Track) -> None:
+        """Give a mover what is on its shape and so close that it might be the carrier's."""
+        close = self._frame.close_points
+        if len(close) == 0 or track.shape is None:
+            return
+        velocity = track.velocities[self._frame.index]
+        seconds = self._frame.seconds_at(close)
+        world = rigid.transform(self._frame.world_from_sensor, close) - seconds[:, None] * velocity
+        own = rigid.transform(rigid.invert(track.world_from_object), world)
+        on = track.shape.holds(own) & np.isfinite(track.shape.distances(own, FOUND_M))
+        if on.sum() < FOUND_GROWTH * track.most_points:
+            self._paint_rows(track, self._frame.close_rows[on], MOVING)
+            track.shape.add(own[on])
 
     def paint_still(
         self, rows: NDArray[np.int64], instance: int, confidence: NDArray[np.float32]
@@ -83,9 +101,13 @@ class Canvas:
         frame = self._frame
         if len(frame.low_rows) == 0:
             return frame.low_rows
-        low = frame.near_points[len(frame.rows) :, :2]
-        distance, _ = cKDTree(frame.points[picked, :2]).query(low, distance_upper_bound=LOW_REACH_M)
-        return frame.low_rows[np.isfinite(distance)]
+        low, own = frame.low_points[:, :2], frame.points[picked, :2]
+        least, most = own.min(axis=0) - LOW_REACH_M, own.max(axis=0) + LOW_REACH_M
+        inside = (low[:, 0] > least[0]) & (low[:, 0] < most[0])
+        inside &= (low[:, 1] > least[1]) & (low[:, 1] < most[1])
+        beside = np.flatnonzero(inside)
+        distance, _ = cKDTree(own).query(low[beside], distance_upper_bound=LOW_REACH_M)
+        return frame.low_rows[beside[np.isfinite(distance)]]
 
 
 def paint_mover(track: Track, frame: SightedFrame, canvas: Canvas, box_growth: float) -> None:
@@ -96,6 +118,7 @@ def paint_mover(track: Track, frame: SightedFrame, canvas: Canvas, box_growth: f
         canvas.paint(
             track, np.union1d(picked, canvas.free(_in_box(track, frame, box_growth))), MOVING
         )
+        canvas.paint_close(track)
         return
     if track.shape is None or frame.index - track.last_index > LOST_FRAMES:
         return
@@ -153,6 +176,7 @@ def _note(track: Track, frame: SightedFrame, pose: rigid.Pose, points: int) -> N
     track.world_from_object = pose
     track.last_index, track.last_stamp = frame.index, frame.stamp
     track.points = points
+    track.most_points = max(track.most_points, points)
 
 
 def _in_box(track: Track, frame: SightedFrame, growth: float) -> NDArray[np.int64]:
@@ -162,17 +186,26 @@ def _in_box(track: Track, frame: SightedFrame, growth: float) -> NDArray[np.int6
     """
     assert track.shape is not None
     velocity = track.velocities[frame.index]
-    own = _own_places(track.world_from_object, frame, np.arange(len(frame.rows)), velocity)
-    inside = track.shape.holds(own)
-    return np.flatnonzero(inside) if inside.sum() < growth * track.points else _NONE
+    about = _about_shape(track.shape, track.world_from_object, frame, velocity)
+    inside = track.shape.holds(_own_places(track.world_from_object, frame, about, velocity))
+    return about[inside] if inside.sum() < growth * track.most_points else _NONE
 
 
 def _near_shape(
     shape: ObjectShape, pose: rigid.Pose, frame: SightedFrame, velocity: NDArray[np.float64]
 ) -> NDArray[np.int64]:
     """The frame's obstacles (K,) on a shape at a pose, if it moves so."""
-    own = _own_places(pose, frame, np.arange(len(frame.rows)), velocity)
-    return np.flatnonzero(np.isfinite(shape.distances(own, FOUND_M)))
+    about = _about_shape(shape, pose, frame, velocity)
+    own = _own_places(pose, frame, about, velocity)
+    return about[np.isfinite(shape.distances(own, FOUND_M))]
+
+
+def _about_shape(
+    shape: ObjectShape, pose: rigid.Pose, frame: SightedFrame, velocity: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """The frame's obstacles (K,) that may be within reach of a shape at a pose."""
+    way = float(np.abs(frame.seconds).max(initial=0.0) * np.linalg.norm(velocity))
+    return frame.about(pose[:3, 3], shape.radius_m + FOUND_M + way)
 
 
 def _own_places(

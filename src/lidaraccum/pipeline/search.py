@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from lidaraccum.pipeline.courses import are_alike
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.gathering import with_middle
+from lidaraccum.pipeline.gathering import WHOLE_GROWTH, with_middle
 from lidaraccum.pipeline.hypotheses import propose
 from lidaraccum.pipeline.motion_settings import SURE, MotionSettings
-from lidaraccum.pipeline.objects import Expectation, WindowObject, explain, join_parts
+from lidaraccum.pipeline.objects import Expectation, WindowObject, explain, join_parts, stands
 from lidaraccum.pipeline.suspects import Lead, Suspect, find_suspects
 
 EXPECTED_M = 1.5
@@ -57,7 +57,8 @@ def find_objects(
         leads: Proposed movers. They must show as much as any other; those whose proposer is sure
             are asked once more, last, on less evidence.
     """
-    free = _accused(frames, settings, expected)
+    suspects = find_suspects(frames, settings)
+    free = _accused(suspects, frames, settings, expected)
     proposed = _Claimed(frames)
     for lead in leads:
         if proposed.share(lead.suspect) <= CLAIMED_SHARE:
@@ -66,31 +67,47 @@ def find_objects(
     movers = _settle(proposed.objects, free, frames, BETTER_SHARE)
     for lead in leads:
         if lead.trust >= SURE and _Claimed(frames, movers).share(lead.suspect) <= KNOWN_SHARE:
-            found = _explain_lead(lead, frames, settings.trusting(), expected)
+            trusting = settings.trusting()
+            found = _explain_lead(lead, frames, trusting, expected)
+            if found is None:  # its proposer may be right that it moves and wrong how
+                proposals = propose(lead.suspect, suspects, frames, settings)
+                found = explain(lead.suspect, proposals, frames, trusting)
             movers = (
                 _settle([_meant(found, lead, frames)], movers, frames, 1.0) if found else movers
             )
-    return [
-        replace(one, picked=with_middle(one.picked, one.velocity, frames, one.stamp, one.turn))
-        for one in join_parts(movers, frames, settings)
-    ]
+    return [_filled(one, frames) for one in join_parts(movers, frames, settings)]
+
+
+def _filled(one: WindowObject, frames: Sequence[SightedFrame]) -> WindowObject:
+    most_growth = WHOLE_GROWTH if one.unseen else np.inf
+    picked = with_middle(one.picked, one.velocity, frames, one.stamp, one.turn, most_growth)
+    return replace(one, picked=picked)
 
 
 def _accused(
-    frames: Sequence[SightedFrame], settings: MotionSettings, expected: Sequence[Expectation]
+    suspects: Sequence[Suspect],
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+    expected: Sequence[Expectation],
 ) -> list[WindowObject]:
-    """The movers that free space raises suspicion of."""
+    """The movers that free space raises suspicion of; those it says least of come last."""
     claimed = _Claimed(frames)
-    suspects = find_suspects(frames, settings)
+    unseen: list[tuple[Suspect, WindowObject]] = []
     for suspect in suspects:
-        if claimed.share(suspect) > CLAIMED_SHARE:
+        if claimed.share(suspect) > CLAIMED_SHARE or stands(suspect, frames, settings):
             continue
         known = _expected_velocities(suspect, frames[suspect.frame].stamp, expected)
         found = explain(suspect, known, frames, settings) if len(known) else None
         if found is None:
             proposals = propose(suspect, suspects, frames, settings)
             found = explain(suspect, proposals, frames, settings)
-        claimed.add(found)
+        if found is not None and found.unseen:
+            unseen.append((suspect, found))
+        else:
+            claimed.add(found)
+    for suspect, found in unseen:
+        if claimed.share(suspect) <= CLAIMED_SHARE:
+            claimed.add(found)
     return claimed.objects
 
 
@@ -153,7 +170,7 @@ def _saved(one: WindowObject) -> float:
 
 def _overlap(one: WindowObject, other: WindowObject) -> bool:
     return any(
-        len(np.intersect1d(picked, other.picked[index]))
+        len(np.intersect1d(picked, other.picked[index], assume_unique=True))
         > CLAIMED_SHARE * min(len(picked), len(other.picked[index]))
         for index, picked in one.picked.items()
         if index in other.picked

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,11 +60,23 @@ class ObjectShape:
     """All that was seen of one object, in its own coordinates (metres, z up)."""
 
     def __init__(self, points: NDArray[np.float64]) -> None:
-        self._points = points[thin(points, GRAIN_M)]
-        self._tree = cKDTree(self._points)
+        self._take(points[thin(points, GRAIN_M)])
 
     def __len__(self) -> int:
         return len(self._points)
+
+    @property
+    def radius_m(self) -> float:
+        """Nothing of it is farther from its origin, seen from above."""
+        return self._radius_m
+
+    def _take(self, points: NDArray[np.float64]) -> None:
+        self._points = points
+        self._columns = np.ascontiguousarray(points.T)
+        self._tree = cKDTree(points, balanced_tree=False)
+        self._radius_m = float(np.hypot(points[:, 0], points[:, 1]).max(initial=0.0))
+        low, high = np.quantile(points, (BOX_QUANTILE, 1 - BOX_QUANTILE), axis=0)
+        self._box = low - BOX_MARGIN_M, high + BOX_MARGIN_M
 
     def distances(self, points: NDArray[np.float64], reach_m: float) -> NDArray[np.float64]:
         """Distance (N,) from points (N, 3) to the shape's nearest; inf beyond the reach."""
@@ -72,9 +85,8 @@ class ObjectShape:
 
     def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether points (N, 3) lie in the box (N,) bool about all but the outermost of it."""
-        low, high = np.quantile(self._points, (BOX_QUANTILE, 1 - BOX_QUANTILE), axis=0)
-        inside = (points > low - BOX_MARGIN_M) & (points < high + BOX_MARGIN_M)
-        return np.asarray(inside.all(axis=1))
+        low, high = self._box
+        return np.asarray(((points > low) & (points < high)).all(axis=1))
 
     def add(self, points: NDArray[np.float64]) -> None:
         """Grow by points (N, 3); what is already there stays, so that the shape does not blur."""
@@ -82,8 +94,8 @@ class ObjectShape:
             return
         distance, _ = self._tree.query(points, distance_upper_bound=2 * GRAIN_M)
         fresh = points[distance > GRAIN_M]
-        self._points = np.concatenate([self._points, fresh[thin(fresh, GRAIN_M)]])
-        self._tree = cKDTree(self._points)
+        if len(fresh):
+            self._take(np.concatenate([self._points, fresh[thin(fresh, GRAIN_M)]]))
 
     def fit(self, points: NDArray[np.float64]) -> ShapeFit:
         """Move points (N, 3), put by prediction, onto the shape; only where that lowers the rest.
@@ -95,83 +107,97 @@ class ObjectShape:
         if len(kept) > FIT_POINTS:
             kept = kept[np.linspace(0, len(kept) - 1, FIT_POINTS).astype(np.int64)]
         chosen = points[kept]
-        before = self._residual(chosen)
+        surface = self._surface_at(chosen)
+        before = surface.residual_m
         total = np.zeros(4)
         for _ in range(STEPS):
-            step = self._step(rigid.transform(_level_motion(total), chosen), total)
+            step = surface.step(total)
             total = total + step
+            surface = self._surface_at(rigid.transform(_level_motion(total), chosen))
             if np.abs(step).max() < 1e-3:
                 break
-        correction = _level_motion(total)
-        after = self._residual(rigid.transform(correction, chosen))
         too_far = np.hypot(total[0], total[1]) > MAX_SHIFT_M or abs(total[3]) > MAX_TURN
-        if too_far or not after < before:
+        if too_far or not surface.residual_m < before:
             return ShapeFit(np.eye(4), before)
-        return ShapeFit(correction, after)
+        return ShapeFit(_level_motion(total), surface.residual_m)
 
-    def _step(self, moved: NDArray[np.float64], total: NDArray[np.float64]) -> NDArray[np.float64]:
-        """One Gauss-Newton step (4,): x, y, z metres and turn, radians."""
-        lag, information = self._surface_at(moved)
-        if len(lag) == 0:
-            return np.zeros(4)
-        known = np.isfinite(lag[:, 0])
-        lag, information, moved = lag[known], information[known], moved[known]
-        if len(lag) == 0:
-            return np.zeros(4)
-        jacobian = np.zeros((len(moved), 3, 4))
-        jacobian[:, 0, 0] = jacobian[:, 1, 1] = jacobian[:, 2, 2] = 1.0
-        jacobian[:, 0, 3], jacobian[:, 1, 3] = -moved[:, 1], moved[:, 0]
-        scale = min(1.0, EFFECTIVE_POINTS / len(moved))
-        weighted = scale * np.einsum("nki,nkl->nil", jacobian, information)
-        prior = np.diag(1.0 / PRIOR**2)
-        normal = np.einsum("nil,nlj->ij", weighted, jacobian) + prior
-        side = np.einsum("nil,nl->i", weighted, lag) - prior @ total
-        return np.linalg.solve(normal, side)
-
-    def _surface_at(
-        self, points: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Way (N, 3) from each point to the shape near it, NaN without, and its certainty."""
-        centre, normal, flatness, spread, near = self._planes(points)
-        lag = centre - points
-        across = np.einsum("ni,ni->n", lag, normal)
-        trust = near / (1.0 + (across / ROBUST_M) ** 2) ** 2
-        outer = normal[:, :, None] * normal[:, None, :]
-        # Off the edge of what was seen so far there is more of the surface, not a lag along it.
-        beside = np.linalg.norm(lag - across[:, None] * normal, axis=1) < EDGE_SPREADS * spread
-        information = outer * (flatness / ACROSS_M**2)[:, None, None]
-        information = information + np.eye(3) * (beside / ALONG_M**2)[:, None, None]
-        lag[~near] = np.nan
-        return lag, information * trust[:, None, None]
-
-    def _planes(
-        self, points: NDArray[np.float64]
-    ) -> tuple[
-        NDArray[np.float64],
-        NDArray[np.float64],
-        NDArray[np.float64],
-        NDArray[np.float64],
-        NDArray[np.bool_],
-    ]:
-        """Planes at points (N, 3): centres, normals (N, 3); flatness, spread m, nearness (N,)."""
+    def _surface_at(self, points: NDArray[np.float64]) -> _Surface:
+        """The planes of the shape near points (N, 3)."""
         count = min(NEIGHBOURS, len(self._points))
         distance, rows = self._tree.query(points, k=count)
         distance, rows = distance.reshape(len(points), count), rows.reshape(len(points), count)
-        around = self._points[rows]
-        centre = around.mean(axis=1)
-        spread = around - centre[:, None]
-        second = np.matmul(spread.transpose(0, 2, 1), spread) / count
-        normals, variances = plane_normals(second[:, _UPPER[0], _UPPER[1]])
+        around = self._columns[:, rows]
+        centre = around.mean(axis=2)
+        spread = around - centre[:, :, None]
+        second = (spread[_UPPER[0]] * spread[_UPPER[1]]).sum(axis=2) / count
+        normals, variances = plane_normals(second.T)
         least, middle, most = variances.T
-        # Neighbours on one line, as those of one beam are, tell no normal.
-        flatness = np.clip(2 * (middle - least) / np.maximum(most, 1e-9), 0, 1)
-        spread_m = np.sqrt(variances.sum(axis=1))
-        return centre, normals, flatness, spread_m, distance[:, 0] < REACH_M
+        return _Surface(
+            place=points.T,
+            lag=centre - points.T,
+            normal=normals.T,
+            # Neighbours on one line, as those of one beam are, tell no normal.
+            flatness=np.clip(2 * (middle - least) / np.maximum(most, 1e-9), 0, 1),
+            spread_m=np.sqrt(variances.sum(axis=1)),
+            near=distance[:, 0] < REACH_M,
+        )
 
-    def _residual(self, points: NDArray[np.float64]) -> float:
-        centre, normal, _, _, near = self._planes(points)
-        across = np.abs(np.einsum("ni,ni->n", centre - points, normal))
-        return float(np.median(np.where(near, across, REACH_M)))
+
+@dataclass(frozen=True, eq=False)
+class _Surface:
+    """The shape near N points: a plane for each.
+
+    Attributes:
+        place: (3, N) the points, metres, the shape's coordinates.
+        lag: (3, N) from them to the centres of the planes' points.
+        normal: (3, N) unit vectors.
+        flatness: (N,) 0..1: how far the plane's points tell its normal.
+        spread_m: (N,) of the plane's points about their centre.
+        near: (N,) bool: whether there is any of the shape within reach.
+    """
+
+    place: NDArray[np.float64]
+    lag: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    flatness: NDArray[np.float64]
+    spread_m: NDArray[np.float64]
+    near: NDArray[np.bool_]
+
+    @cached_property
+    def across(self) -> NDArray[np.float64]:
+        """(N,) metres from the points to their planes, along the normals."""
+        return np.asarray((self.lag * self.normal).sum(axis=0))
+
+    @property
+    def residual_m(self) -> float:
+        """Median distance to the planes."""
+        return float(np.median(np.where(self.near, np.abs(self.across), REACH_M)))
+
+    def step(self, total: NDArray[np.float64]) -> NDArray[np.float64]:
+        """One Gauss-Newton step (4,), x, y, z metres and turn, radians, after those so far."""
+        count = int(np.count_nonzero(self.near))
+        if count == 0:
+            return np.zeros(4)
+        trust = self.near / (1.0 + (self.across / ROBUST_M) ** 2) ** 2
+        # Off the edge of what was seen so far there is more of the surface, not a lag along it.
+        aside = np.sqrt(((self.lag - self.across * self.normal) ** 2).sum(axis=0))
+        beside = aside < EDGE_SPREADS * self.spread_m
+        sure_across = trust * self.flatness / ACROSS_M**2
+        sure_along = trust * beside / ALONG_M**2
+        # A turn moves a point by (-y, x, 0).
+        x, y, _ = self.place
+        toward = np.vstack([self.normal, x * self.normal[1] - y * self.normal[0]])
+        normal = (toward * sure_across) @ toward.T
+        side = toward @ (sure_across * self.across)
+        normal[range(3), range(3)] += sure_along.sum()
+        turned = np.array([-(sure_along @ y), sure_along @ x, 0.0, sure_along @ (x * x + y * y)])
+        normal[3, :3] += turned[:3]
+        normal[:, 3] += turned
+        side[:3] += self.lag @ sure_along
+        side[3] += sure_along @ (x * self.lag[1] - y * self.lag[0])
+        scale = min(1.0, EFFECTIVE_POINTS / count)
+        prior = 1.0 / PRIOR**2
+        return np.linalg.solve(scale * normal + np.diag(prior), scale * side - prior * total)
 
 
 def _level_motion(values: NDArray[np.float64]) -> rigid.Pose:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.geometry import rigid
-from lidaraccum.pipeline.courses import carried, turned
 from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.landing import land, nearest
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.suspects import Template
 
@@ -30,9 +30,11 @@ BENDS = (0.1, 0.2, 0.4, 0.8, -0.1, -0.2, -0.4, -0.8)
 BENDS_REFINED = 2
 FINER = (0.75, 1.25)
 WORTH_BENDING = 0.05
+BENDING_SAVES = 0.15
 """Turns over the window, radians, that are tried on what no straight course explains, how many of
 them are refined, shares of the best that are tried then, and how much less one must cost than going
-straight."""
+straight. None is refined where all cost more than that before, or so much more than any motion
+may."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,10 +44,13 @@ class Verdict:
     Attributes:
         cost: Truncated distance to the nearest partner over the gate, see `MotionSettings`.
         through: Share of points without partner in places that the frame saw through.
+        shown: How much more the first hypothesis costs, summed where neither puts a point into a
+            place that is hidden from the frame: what is seen of it, not what may be.
     """
 
     cost: NDArray[np.float64]
     through: NDArray[np.float64]
+    shown: NDArray[np.float64]
 
 
 def judge(
@@ -59,8 +64,14 @@ def judge(
 
     ``turns`` (H,), radians a second, are tried with them; straight on when None.
     """
-    cost, through = judge_points(template, velocities, frames, settings, turns)
-    return Verdict(cost=cost.mean(axis=1), through=through.mean(axis=1))
+    total, passed, shown = np.zeros((3, len(velocities)))
+    others = 0
+    for cost, through, hidden in _by_frame(template, velocities, frames, settings, turns):
+        total += cost.mean(axis=1)
+        passed += through.mean(axis=1)
+        shown += np.where(hidden | hidden[0], 0.0, cost[0] - cost).mean(axis=1)
+        others += 1
+    return Verdict(cost=total / others, through=passed / others, shown=shown / others)
 
 
 def judge_points(
@@ -71,28 +82,33 @@ def judge_points(
     turns: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """As `judge`, point by point: costs (H, P) and shares of frames that saw through (H, P)."""
-    hypotheses, count = len(velocities), len(template.world)
-    turns = np.zeros(hypotheses) if turns is None else turns
-    heights = np.tile(template.heights, hypotheses)
-    costs, passed = [], []
+    said = list(_by_frame(template, velocities, frames, settings, turns))
+    costs, passed, _ = (np.mean(part, axis=0) for part in zip(*said, strict=True))
+    return costs, passed
+
+
+def _by_frame(
+    template: Template,
+    velocities: NDArray[np.float64],
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+    turns: NDArray[np.float64] | None,
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]]:
+    """What each other frame says: costs, what it saw through, what is hidden from it, (H, P)."""
+    turns = np.zeros(len(velocities)) if turns is None else turns
+    gate = settings.truncation_m
     for frame in frames:
-        seconds = frame.stamp - template.stamp
-        if seconds == 0:
+        if frame.stamp == template.stamp:
             continue
-        moved = template.world[None] + velocities[:, None] * seconds
-        for row in np.flatnonzero(turns):
-            turn = float(turns[row])
-            moved[row] = carried(template.world, template.pivot, velocities[row], turn, seconds)
-        local = as_met(moved, velocities[:, None], template.seconds, frame).reshape(-1, 3)
-        gate = settings.truncation_m
-        distance, _ = frame.tree.query(frame.places(local, heights), distance_upper_bound=gate)
-        through = np.isinf(distance)
-        through[through] = frame.view.look(local[through]).through
-        alone = np.where(through, THROUGH_COST, HIDDEN_COST)
-        cost = np.where(np.isinf(distance), alone, distance / gate)
-        costs.append(cost.reshape(hypotheses, count))
-        passed.append(through.reshape(hypotheses, count))
-    return np.mean(costs, axis=0), np.mean(passed, axis=0)
+        local = land(template, velocities, turns, frame)
+        distance, _ = nearest(local, template.heights, frame, gate)
+        alone = np.isinf(distance)
+        cost = distance / gate
+        cost[alone] = HIDDEN_COST
+        through = np.zeros_like(alone)
+        through[alone] = frame.view.look(local[:, alone].T).through
+        cost[through] = THROUGH_COST
+        yield cost, through, alone & ~through
 
 
 def slide_velocity(
@@ -135,27 +151,20 @@ def bend_course(
     turns = np.array((0.0, *BENDS)) / max(max(stamps) - min(stamps), 1e-6)
     costs = judge(template, np.tile(velocity, (len(turns), 1)), frames, settings, turns).cost
     best, cost = (velocity, 0.0), float(costs[0]) - WORTH_BENDING
-    promising = turns[1:][np.argsort(costs[1:], kind="stable")[:BENDS_REFINED]]
-    for finer in (False, True):
-        start, about = best
-        if finer and about == 0:
+    if costs[1:].min() > min(float(costs[0]), settings.max_cost + BENDING_SAVES):
+        return best
+    tried = turns[1:][np.argsort(costs[1:], kind="stable")[:BENDS_REFINED]]
+    for _ in range(2):
+        starts = np.tile(best[0], (len(tried), 1))
+        refined = refine_velocities(template, starts, tried, frames, settings)
+        costs = judge(template, refined, frames, settings, tried).cost
+        least = int(costs.argmin())
+        if costs[least] < cost:
+            best, cost = (refined[least], float(tried[least])), float(costs[least])
+        if best[1] == 0:
             break
-        for turn in (about * np.array(FINER) if finer else promising).tolist():
-            refined = refine_velocity(template, start, frames, settings, turn)
-            its_cost = _cost(template, refined, turn, frames, settings)
-            if its_cost < cost:
-                best, cost = (refined, turn), its_cost
+        tried = best[1] * np.array(FINER)
     return best
-
-
-def _cost(
-    template: Template,
-    velocity: NDArray[np.float64],
-    turn: float,
-    frames: Sequence[SightedFrame],
-    settings: MotionSettings,
-) -> float:
-    return float(judge(template, velocity[None], frames, settings, np.array([turn])).cost[0])
 
 
 def as_met(
@@ -189,33 +198,53 @@ def refine_velocity(
     settings: MotionSettings,
     turn: float = 0.0,
 ) -> NDArray[np.float64]:
-    """The velocity (3,) that best takes a cluster onto all other frames together, from a start.
+    """`refine_velocities` for one velocity (3,)."""
+    return refine_velocities(template, velocity[None], np.array([turn]), frames, settings)[0]
+
+
+def refine_velocities(
+    template: Template,
+    velocities: NDArray[np.float64],
+    turns: NDArray[np.float64],
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+    steps: int = REFINING_STEPS,
+) -> NDArray[np.float64]:
+    """Velocities (H, 3) that best take a cluster onto all other frames together, from H starts.
 
     ICP with one unknown for the whole window: each frame asks for a shift, its points in number
-    and its distance in time are its weight. ``turn``, radians a second, stays as it is.
+    and its distance in time are its weight. ``turns`` (H,), radians a second, stay as they are.
     """
-    refined = velocity.copy()
-    for _ in range(REFINING_STEPS):
-        asked, weight = np.zeros(3), 0.0
+    refined = velocities.copy()
+    for _ in range(steps):
+        asked, weight = np.zeros((2, len(refined))), np.zeros(len(refined))
         for frame in frames:
             seconds = frame.stamp - template.stamp
             if seconds == 0:
                 continue
-            moved = carried(template.world, template.pivot, refined, turn, seconds)
-            local = as_met(moved, refined, template.seconds, frame)
-            distance, partner = frame.tree.query(
-                frame.places(local, template.heights),
-                distance_upper_bound=2 * settings.truncation_m,
-            )
-            hit = np.isfinite(distance)
-            if not hit.any():
-                continue
-            trust = 1 / (0.1 + distance[hit])
-            lag = (frame.near_points[partner[hit]] - local[hit]) * trust[:, None]
-            shift = frame.world_from_sensor[:3, :3] @ (lag.sum(axis=0) / trust.sum())
-            asked += hit.sum() * seconds * turned(shift, -0.5 * turn * seconds)
-            weight += hit.sum() * seconds**2
-        if weight == 0:
-            break
-        refined[:2] += asked[:2] / weight
+            hits, shift = _asked_shifts(template, refined, turns, frame, settings)
+            half = -0.5 * turns * seconds
+            asked[0] += hits * seconds * (np.cos(half) * shift[0] - np.sin(half) * shift[1])
+            asked[1] += hits * seconds * (np.sin(half) * shift[0] + np.cos(half) * shift[1])
+            weight += hits * seconds**2
+        refined[:, :2] += (asked / np.where(weight > 0, weight, 1.0)).T
     return refined
+
+
+def _asked_shifts(
+    template: Template,
+    velocities: NDArray[np.float64],
+    turns: NDArray[np.float64],
+    frame: SightedFrame,
+    settings: MotionSettings,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Points (H,) with a partner in a frame, and the shift (3, H) they ask for, metres, world."""
+    local = land(template, velocities, turns, frame)
+    distance, partner = nearest(local, template.heights, frame, 2 * settings.truncation_m)
+    hit = np.isfinite(distance)
+    if not hit.any():
+        return np.zeros(len(turns), dtype=np.int64), np.zeros((3, len(turns)))
+    trust = np.where(hit, 1 / (0.1 + distance), 0.0)
+    lag = frame.near_points.take(partner, axis=0, mode="clip").transpose(2, 0, 1) - local
+    shift = (lag * trust).sum(axis=2) / np.maximum(trust.sum(axis=1), 1e-9)
+    return np.count_nonzero(hit, axis=1), frame.world_from_sensor[:3, :3] @ shift

@@ -25,6 +25,9 @@ HOLD = 2e-4
 """Weight, beside the average plane's 1, of staying at the start: it decides only directions that
 the planes leave open (along a tunnel), where it keeps the prediction."""
 
+RAIL = 1e3
+"""The same along a rail: no plane counts against it."""
+
 MOST_FACE = 0.5
 LEANING = np.cos(np.deg2rad(15.0))
 """With more than this share of the planes facing one way, those within this angle of it are taken
@@ -61,20 +64,25 @@ def align(
     *,
     finest: int = 0,
     iterations: int = 15,
+    rail: NDArray[np.float64] | None = None,
 ) -> rigid.Pose:
     """The pose near ``start`` that lays points (M, 3), sensor coordinates, onto the map's planes.
 
     Gauss-Newton on point-to-plane distances under a Geman-McClure kernel, whose scale follows the
-    spread of the distances (Chebrolu et al. 2021 show why it must).
+    spread of the distances (Chebrolu et al. 2021 show why it must). Along a ``rail`` (3,), world,
+    it stays where it is.
     """
     pose = start.copy()
+    hold = HOLD * np.eye(6)
+    if rail is not None:
+        hold[3:, 3:] += RAIL * np.outer(rail, rail)
     for _ in range(iterations):
         placed = rigid.transform(pose, points)
         matches = surface.match(placed, finest)
         if len(matches.rows) < 6:
             return pose
         away = np.concatenate([np.zeros(3), pose[:3, 3] - start[:3, 3]])
-        step = _solve(matches, placed[matches.rows] - pose[:3, 3], away)
+        step = _solve(matches, placed[matches.rows] - pose[:3, 3], away, hold)
         pose = moved(pose, step)
         if np.abs(step[:3]).max() < STOP_RAD and np.abs(step[3:]).max() < STOP_M:
             break
@@ -122,9 +130,12 @@ def kernel_weights(matches: Matches, alike: BoolArray) -> NDArray[np.float64]:
 
 
 def _solve(
-    matches: Matches, arms: NDArray[np.float64], away: NDArray[np.float64]
+    matches: Matches,
+    arms: NDArray[np.float64],
+    away: NDArray[np.float64],
+    hold: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """One step (6,).
+    """One step (6,); ``hold`` (6, 6), per plane, draws back by what it is ``away`` (6,).
 
     The little by which each of the planes leans that face one way is roughness, or an error: a
     voxel that one beam crossed knows its plane along the beam only, so the same beam a little
@@ -136,9 +147,9 @@ def _solve(
     weights = kernel_weights(matches, alike)
     slopes = jacobian(arms, normals)
     weighted = slopes * weights[:, None]
-    hold = HOLD * weights.sum() * np.ones(6)
-    gradient = weighted.T @ matches.distances + hold * away
-    return -np.linalg.solve(weighted.T @ slopes + np.diag(hold), gradient)
+    held = weights.sum() * hold
+    gradient = weighted.T @ matches.distances + held @ away
+    return -np.linalg.solve(weighted.T @ slopes + held, gradient)
 
 
 def assess(

@@ -38,12 +38,14 @@ class Located:
         alignment: The refined pose and its scores.
         rival: Score of the best distinct other answer over this one's; 0 when none was sought.
         rival_distance_m: How far away that other answer lies.
+        sighted: Whether sight lines fix what planes leave open.
     """
 
     hypothesis: str
     alignment: Alignment
     rival: float = 0.0
     rival_distance_m: float = 0.0
+    sighted: bool = False
 
 
 def refine(surface: SurfaceMap, source: NDArray[np.float64], start: Hypothesis) -> Located:

@@ -10,16 +10,20 @@ from itertools import islice, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from lidaraccum.data.frame import Frame
+from lidaraccum.data.frame import BoolArray, Frame
 from lidaraccum.data.registered import RegisteredFrame
 from lidaraccum.errors import InputError
 from lidaraccum.geometry import rigid
+from lidaraccum.registration.along import APART_M, SURE, SteadyMotion
 from lidaraccum.registration.azimuth_time import Glimpse
 from lidaraccum.registration.deskew import Compensated, SweepClock, TimedSweep
 from lidaraccum.registration.locate import Hypothesis
 from lidaraccum.registration.pace import Pace
+from lidaraccum.registration.quality import ADRIFT
 from lidaraccum.registration.scan import StaticMask, usable_points
 from lidaraccum.registration.settings import RegistrationSettings
+from lidaraccum.registration.sightlines import gain
+from lidaraccum.registration.surface_map import SurfaceMap
 from lidaraccum.registration.sweep import SweepDetector
 from lidaraccum.registration.tracker import (
     CONTRADICTION_M,
@@ -35,6 +39,11 @@ WINDOW = 5
 """Frames looked at together for the motion within a sweep."""
 
 MAX_OPENING_PASSES = 3
+MAX_FREEING_PASSES = 2
+
+UNCLEAR = 1.0
+"""Standard deviations by which an unclear motion must be preferred; a clear one by any."""
+
 SETTLED_M, SETTLED_RAD = 0.02, 0.001
 """The first frames are solved again as long as the first motion changes by more."""
 
@@ -141,9 +150,83 @@ class Odometry:
         self._tracker = Tracker(settings, self._pace, Compensated())
 
     def open(self, opening: list[Indexed]) -> list[RegisteredFrame]:
-        """Solve the first frames together: once to learn the motion, once more with it."""
+        """Solve the first frames together, and again where planes leave their motion open."""
         if not opening:
             return []
+        passed = self._open(opening)
+        if self._given is None and 2 * len(self._tracker.open_axes) >= len(passed):
+            return self._freed(opening, passed)
+        return passed
+
+    def _freed(
+        self, opening: list[Indexed], passed: list[RegisteredFrame]
+    ) -> list[RegisteredFrame]:
+        """The first frames from the steady motion that sight lines prefer, if they do clearly."""
+        reach_m = self._settings.max_speed_mps * self._pace.interval_s
+        is_clear = True
+        for _ in range(MAX_FREEING_PASSES):
+            kept, steady = self._tracker, self._steady_motion(passed)
+            before = steady.agreement([one.world_from_sensor for one in passed])
+            best = steady.best(reach_m)
+            is_clear = best.is_clear
+            again = self._ridden(opening, kept.clock, best.poses, steady.axis)
+            found = steady.agreement([one.world_from_sensor for one in again])
+            # Planes are finer than sight lines, but know only where rings were.
+            is_near = abs(_step(*passed[:2]) - _step(*again[:2])).max() < APART_M
+            enough = SURE if is_near else 0.0 if is_clear else UNCLEAR
+            if gain(found, before) <= enough:
+                self._tracker = kept
+                break
+            passed = self._timed_again(opening, again, best.poses, steady.axis)
+        return passed if is_clear else [passed[0], *map(_adrift, passed[1:])]
+
+    def _timed_again(
+        self,
+        opening: list[Indexed],
+        passed: list[RegisteredFrame],
+        poses: list[rigid.Pose],
+        axis: NDArray[np.float64],
+    ) -> list[RegisteredFrame]:
+        """The same frames by the clock that their motion, now that it is another, shows."""
+        self._detector = SweepDetector(self._settings)
+        clock = self._look_at_sweep() if self._settings.deskew == "auto" else None
+        if clock is None or clock == self._tracker.clock:
+            return passed
+        return self._ridden(opening, clock, poses, axis)
+
+    def _ridden(
+        self,
+        opening: list[Indexed],
+        clock: SweepClock,
+        poses: list[rigid.Pose],
+        axis: NDArray[np.float64],
+    ) -> list[RegisteredFrame]:
+        """The first frames at steady poses, from the first frame on, moved across an axis only."""
+        stamps = [frame.stamp for _, frame in opening]
+        twist = rigid.logarithm(poses[1]) / self._pace.steps(stamps[0], stamps[1])
+        self._begin(clock, twist)
+        frames = [self._place(*opening[0])]
+        first = frames[0].world_from_sensor
+        rail = first[:3, :3] @ axis
+        for (index, raw), pose in zip(opening[1:], poses[1:], strict=True):
+            usable = usable_points(raw, self._settings, self._static_mask)
+            frames.append(self._tracker.ride(index, raw, usable, first @ pose, rail))
+            self._note(index, raw, usable, frames[-1])
+        return frames
+
+    def _steady_motion(self, passed: list[RegisteredFrame]) -> SteadyMotion:
+        sights = list(self._tracker.sights)[: len(passed)]
+        stamps = [one.frame.stamp for one in passed]
+        steps = [self._pace.steps(*pair) for pair in pairwise(stamps)]
+        surface = SurfaceMap(self._settings.voxel_m, self._settings.max_range_m * 1.1)
+        surface.insert(sights[0].points, now=0)
+        # Which way it points may differ, and one frame may err.
+        axes = np.stack(self._tracker.open_axes)
+        axis = passed[0].world_from_sensor[:3, :3].T @ np.linalg.eigh(axes.T @ axes)[1][:, 2]
+        return SteadyMotion(sights, np.cumsum([0.0, *steps]), surface, axis)
+
+    def _open(self, opening: list[Indexed]) -> list[RegisteredFrame]:
+        """Solve the first frames together: once to learn the motion, once more with it."""
         for (_, earlier), (_, later) in pairwise(opening):
             self._pace.see(earlier.stamp, later.stamp)
         has_times = self._settings.deskew == "auto" and opening[0][1].time_offset is not None
@@ -227,10 +310,13 @@ class Odometry:
     def _run(
         self, opening: list[Indexed], clock: SweepClock, twist: NDArray[np.float64] | None
     ) -> list[RegisteredFrame]:
+        self._begin(clock, twist)
+        return [self._place(index, frame) for index, frame in opening]
+
+    def _begin(self, clock: SweepClock, twist: NDArray[np.float64] | None) -> None:
         self._tracker = Tracker(self._settings, self._pace, clock, twist)
         self._last = self._stamp = None
         self._recent.clear()
-        return [self._place(index, frame) for index, frame in opening]
 
     def _place(self, index: int, raw: Frame) -> RegisteredFrame:
         usable = usable_points(raw, self._settings, self._static_mask)
@@ -248,12 +334,15 @@ class Odometry:
             step = rigid.invert(self._given_pose(before)) @ pose
             hints = (Hypothesis("given", world_from_before @ step), Hypothesis("given", pose))
             registered = self._tracker.follow(index, raw, usable, hints)
+        self._note(index, raw, usable, registered)
+        return registered
+
+    def _note(self, index: int, raw: Frame, usable: BoolArray, registered: RegisteredFrame) -> None:
         self._last = index, registered.world_from_sensor
         self._stamp = raw.stamp
         if not self._detector.done:
             points = raw.points[usable].astype(np.float64)
             self._recent.append((raw, Glimpse(points, registered.world_from_sensor, np.zeros(6))))
-        return registered
 
     def _look_at_sweep(self) -> SweepClock | None:
         if self._detector.done or len(self._recent) < 2:
@@ -286,6 +375,13 @@ class Odometry:
 
     def _step_twists(self, passed: list[RegisteredFrame]) -> NDArray[np.float64]:
         return _steps_between(self._pace, [one.frame.stamp for one in passed], passed)
+
+
+def _adrift(frame: RegisteredFrame) -> RegisteredFrame:
+    doubts = frame.quality.doubts
+    if ADRIFT in doubts:
+        return frame
+    return replace(frame, quality=replace(frame.quality, doubts=(*doubts, ADRIFT)))
 
 
 def _steps_between(

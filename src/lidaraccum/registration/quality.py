@@ -26,6 +26,9 @@ MIN_HOLD = 0.003
 face it give. Beside a street's walls it is 0.05-0.3."""
 
 
+ADRIFT = "nothing in view fixes the motion in one direction"
+
+
 class Judge:
     """Knows how well frames of this sequence usually fit."""
 
@@ -73,8 +76,8 @@ class Judge:
         if located.rival > 1 - self._settings.ambiguity:
             distance = located.rival_distance_m
             doubts.append(f"another motion, {distance:.1f} m away, fits nearly as well")
-        if weakest_direction(alignment) < MIN_HOLD:
-            doubts.append("nothing in view fixes the motion in one direction")
+        if weakest_direction(alignment) < MIN_HOLD and not located.sighted:
+            doubts.append(ADRIFT)
         if speed_mps > self._settings.max_speed_mps:
             doubts.append(f"it implies {speed_mps:.0f} m/s")
         return doubts

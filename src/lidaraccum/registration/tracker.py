@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,14 +11,16 @@ from numpy.typing import NDArray
 from lidaraccum.data.frame import BoolArray, Frame
 from lidaraccum.data.registered import RegisteredFrame, RegistrationQuality
 from lidaraccum.geometry import rigid
+from lidaraccum.registration.along import COARSE_POINTS, open_axis
 from lidaraccum.registration.deskew import SweepClock
-from lidaraccum.registration.icp import assess
+from lidaraccum.registration.icp import align, assess
 from lidaraccum.registration.locate import Hypothesis, Located, proposed, refine, search
 from lidaraccum.registration.pace import Pace
 from lidaraccum.registration.proposals import Reach
 from lidaraccum.registration.quality import Judge
 from lidaraccum.registration.scan import Scan, prepare
 from lidaraccum.registration.settings import RegistrationSettings
+from lidaraccum.registration.sightlines import Eye, Sight
 from lidaraccum.registration.surface_map import SurfaceMap
 
 MAX_ACCELERATION = 8.0
@@ -31,6 +34,9 @@ SAME_TWIST_M, SAME_TWIST_RAD = 0.02, 0.0005
 
 MAX_PASSES = 3
 MAX_REACH_M = 60.0
+
+SIGHTS = 4
+"""Frames whose sight lines the next one is compared with where planes leave a direction open."""
 
 PATIENCE = 3
 """Frames in a row that may be left out of the map as lost before the map starts anew."""
@@ -92,6 +98,9 @@ class Tracker:
         self._last: Fix | None = None
         self._first_origin = np.zeros(3)
         self._lost = 0
+        self._eye = Eye()
+        self.sights: deque[Sight] = deque(maxlen=SIGHTS + 1)
+        self.open_axes: list[NDArray[np.float64]] = []
 
     def start(self, index: int, raw: Frame, usable: BoolArray, pose: rigid.Pose) -> RegisteredFrame:
         """Put the first frame on the empty map."""
@@ -116,6 +125,25 @@ class Tracker:
             quality = replace(quality, doubts=(*quality.doubts, contradiction))
         return self._remember(scan, self.twist, pose, quality)
 
+    def ride(
+        self,
+        index: int,
+        raw: Frame,
+        usable: BoolArray,
+        pose: rigid.Pose,
+        rail: NDArray[np.float64],
+    ) -> RegisteredFrame:
+        """Put a frame at a pose, as planes have it but for its place along a rail (3,), world."""
+        steps = self._steps_to(index, raw)
+        scan = self._prepare(index, raw, usable)
+        source = scan.source(self._twist_to(pose, steps))
+        placed = align(self._surface, source, pose, rail=rail)
+        located = Located("steady", assess(self._surface, source, placed), sighted=True)
+        self.open_axes.append(rail)
+        self.twist = self._twist_to(placed, steps)
+        quality = self._judge.judge(located, self._speed(placed, steps))
+        return self._remember(scan, self.twist, placed, quality)
+
     def follow(
         self, index: int, raw: Frame, usable: BoolArray, hints: tuple[Hypothesis, ...] = ()
     ) -> RegisteredFrame:
@@ -138,6 +166,7 @@ class Tracker:
             twist = found
             again = refine(self._surface, scan.source(twist), _start_of(located))
             located = replace(located, alignment=again.alignment)
+        self._look_along(scan, located, expectation.steps)
         return self._conclude(scan, located, expectation)
 
     def _expect(self, index: int, raw: Frame, hints: tuple[Hypothesis, ...]) -> Expectation:
@@ -172,6 +201,22 @@ class Tracker:
         shifts = proposed(self._surface, source, first.world_from_sensor, reach, axes)
         return search(self._surface, source, [*expectation.starts, *shifts], found)
 
+    def _look_along(self, scan: Scan, located: Located, steps: float) -> None:
+        """Note the direction that planes leave open, if they do."""
+        if scan.raw.origin.any() or scan.index >= self._settings.lookahead:
+            return
+        pose = located.alignment.world_from_sensor
+        axis = open_axis(self._surface, scan.source(self._twist_to(pose, steps)), pose)
+        if axis is not None:
+            self.open_axes.append(axis)
+
+    def _sight(
+        self, scan: Scan, frame: Frame, twist: NDArray[np.float64], pose: rigid.Pose
+    ) -> Sight:
+        source = scan.source(twist)
+        few = source[:: max(1, len(source) // COARSE_POINTS)]
+        return Sight(frame, scan.usable, few, pose, self._eye)
+
     def _is_smooth(self, found: Located, start: Hypothesis, steps: float) -> bool:
         interval_s = steps * self._pace.interval_s
         away = found.alignment.world_from_sensor[:3, 3] - start.world_from_sensor[:3, 3]
@@ -205,6 +250,7 @@ class Tracker:
     ) -> RegisteredFrame:
         frame = scan.straightened(twist)
         self._surface.insert(rigid.transform(pose, frame.points[scan.usable]), scan.index)
+        self.sights.append(self._sight(scan, frame, twist, pose))
         self._surface.forget_far(pose[:3, 3], scan.index)
         self._last = Fix(scan.index, frame.stamp, pose)
         return self._registered(scan, frame, pose, quality)

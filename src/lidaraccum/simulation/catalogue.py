@@ -45,6 +45,12 @@ class Catalogue:
         self._rng = rng
         self._pools: dict[str, list[Model]] = {}
 
+    def drawing_from(self, rng: np.random.Generator) -> Catalogue:
+        """The shapes so far in a catalogue that draws from another generator; this one stays."""
+        other = Catalogue(rng)
+        other._pools = {name: list(pool) for name, pool in self._pools.items()}
+        return other
+
     def draw(self, name: str) -> Model:
         """A model called ``name`` in ``MAKERS``, with its own paint."""
         pool = self._pools.setdefault(name, [])

@@ -59,9 +59,13 @@ class Plot:
 
     def is_free(self, place: Array, radius: float) -> bool:
         """Whether a disc overlaps nothing yet."""
-        discs = self.discs
-        gap = np.hypot(discs[:, 0] - place[0], discs[:, 1] - place[1])
-        return not bool(np.any(gap < discs[:, 2] + radius))
+        return bool(self.are_free(place[None], radius)[0])
+
+    def are_free(self, places: Array, radius: float) -> NDArray[np.bool_]:
+        """(N,) whether discs about places (N, 2) overlap nothing yet."""
+        x, y, wide = self.discs.T
+        gap = (x - places[:, :1]) ** 2 + (y - places[:, 1:]) ** 2
+        return ~(gap < (wide + radius) ** 2).any(axis=1)
 
     def take(self, places: Array, radius: float) -> None:
         """Reserve discs about places (N, 2)."""
@@ -103,16 +107,27 @@ class Plot:
             spots, radius = _footprint(mesh, place, float(yaw))
             if not self.off_road(spots, min(margin, 0.3) + radius).all():
                 continue
-            if all(self.is_free(spot, radius) for spot in spots):
+            if self.are_free(spots, radius).all():
                 self.take(spots, radius)
                 self.put(mesh, place, float(yaw), 0.05)
 
     def run_barrier(
-        self, maker: Callable[[Array, np.random.Generator], Mesh], line: Array, radius: float = 0.5
+        self,
+        maker: Callable[[Array, np.random.Generator], Mesh],
+        line: Array,
+        radius: float = 0.5,
+        margin: float = 0.3,
     ) -> None:
-        """Draw a barrier along the free stretch of ground points (K, 2), about a metre apart."""
-        keep = self.off_road(line, 0.3)
-        free = [ok and self.is_free(point, radius) for point, ok in zip(line, keep, strict=True)]
+        """Draw a barrier along the free stretch of ground points (K, 2), about a metre apart.
+
+        Args:
+            maker: Makes a barrier along ground points (K, 3).
+            line: (K, 2) metres.
+            radius: Half of what it takes up, metres.
+            margin: Least distance from a carriageway, metres; negative in a parking strip.
+        """
+        keep = self.off_road(line, margin)
+        free = keep & self.are_free(line, radius)
         breaks = np.flatnonzero(np.diff(np.r_[False, free, False].astype(int)))
         for start, end in zip(breaks[::2], breaks[1::2], strict=True):
             if end - start < 4:
@@ -130,7 +145,7 @@ class Plot:
         radius = 0.5 * min(width, length) + 0.15
         if not self.terrain.covers(spots, 3.0).all():
             return False
-        if not anywhere and not all(self.is_free(spot, radius) for spot in spots):
+        if not anywhere and not self.are_free(spots, radius).all():
             return False
         self.take(spots, radius)
         size = (0.6 * length, 0.8 * width)

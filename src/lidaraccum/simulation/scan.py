@@ -12,7 +12,7 @@ from lidaraccum.simulation.actors import Actor
 from lidaraccum.simulation.mesh import Mesh
 from lidaraccum.simulation.raycast import RayCaster, RayScene
 from lidaraccum.simulation.sensor import Sensor
-from lidaraccum.simulation.surfaces import PASS_SHARE
+from lidaraccum.simulation.surfaces import PASS_SHARE, Surface
 from lidaraccum.simulation.world import World
 
 Array = NDArray[np.float64]
@@ -20,6 +20,14 @@ Float = NDArray[np.float32]
 PASSES = 3
 """A ray goes through so many see-through surfaces at most, less one."""
 STEP_PAST_M = 0.01
+CLEAREST_PANE = 0.45
+"""Share of echoes from inside that come back through the clearest car's windows; others have less.
+
+Without it 22 % of a simulated car's points lay more than 1.2 m behind the first, of recorded ones
+8 % (HDL-64E, cars at 11 to 16 m): cars one sees through are not what a network should expect.
+"""
+GOLDEN = 0.6180339887
+"""Multiples of it, less their whole parts, spread evenly: how clear a car's windows are."""
 STRIDE = 24
 """An actor's bearing is worked out at so many columns' distance before it is culled."""
 
@@ -164,6 +172,7 @@ class Stage:
             share = PASS_SHARE.take(found.surface)
             open_to = np.flatnonzero((share > 0) & np.isfinite(found.distance))
             through = open_to[rng.random(len(open_to)) < share[open_to]]
+            through = _not_swallowed(found, through, rng)
             if not len(through):
                 break
             gone[through] = found.distance[through] + STEP_PAST_M
@@ -295,6 +304,19 @@ class Visit:
     solid: Solid
     numbers: NDArray[np.int64]
     rays: Float
+
+
+def _not_swallowed(
+    found: Encounter, through: NDArray[np.int64], rng: np.random.Generator
+) -> NDArray[np.int64]:
+    """Rays (K,) that go on; the others are swallowed inside a car, whose ``found`` is blanked.
+
+    An echo from inside has to come back through the pane too, and panes are tinted, car by car.
+    """
+    clear = CLEAREST_PANE * np.modf(found.instance[through] * GOLDEN)[0]
+    dark = (found.surface[through] == Surface.CAR_GLASS) & (rng.random(len(through)) > clear)
+    found.distance[through[dark]] = np.inf
+    return through[~dark]
 
 
 def _rows_of(

@@ -31,9 +31,14 @@ STYLES: dict[str, dict[str, float]] = {
 STREET_CARS = {"car": 20.0, "van": 3.0, "truck": 0.5, "trailer": 0.4, "motorcycle": 0.6}
 
 
-def line_road(site: Site, road: Road, kind: str) -> None:
-    """Both sides of a road, its parking strips included, block by block."""
+def line_road(site: Site, road: Road, kind: str) -> list[tuple[Block, str]]:
+    """Both sides of a road, its parking strips included, block by block.
+
+    Returns:
+        The blocks that were lined and their styles.
+    """
     rng, chances = site.rng, STYLES[kind]
+    lined: list[tuple[Block, str]] = []
     names, weights = list(chances), np.array(list(chances.values()))
     for side in (-1, 1):
         start = 0.0
@@ -46,6 +51,8 @@ def line_road(site: Site, road: Road, kind: str) -> None:
                 _park_row(site, block)
                 _pavement(site, block, style)
                 PROPERTIES[style](site, block)
+                lined.append((block, style))
+    return lined
 
 
 def _is_near(site: Site, block: Block) -> bool:

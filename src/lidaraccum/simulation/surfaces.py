@@ -64,7 +64,7 @@ PASS_SHARE = _table(
 
 LOSS_SHARE = _table(
     0.0,
-    {Surface.GLASS: 0.4, Surface.CAR_GLASS: 0.28, Surface.CAR_PAINT: 0.02, Surface.TRIM: 0.1},
+    {Surface.GLASS: 0.4, Surface.CAR_GLASS: 0.4, Surface.CAR_PAINT: 0.02, Surface.TRIM: 0.1},
 )
 """Share of the pulses thrown elsewhere as by a mirror, never to come back."""
 

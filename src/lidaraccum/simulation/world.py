@@ -15,6 +15,7 @@ from lidaraccum.simulation.plot import Plot, Still
 from lidaraccum.simulation.roads import Network
 from lidaraccum.simulation.site import Site
 from lidaraccum.simulation.streets import line_road
+from lidaraccum.simulation.suburbs import overgrow
 from lidaraccum.simulation.terrain import Terrain, ground_mesh, kerb_mesh, shape_terrain
 from lidaraccum.simulation.vegetation import draw_tree
 
@@ -52,6 +53,7 @@ def build_world(network: Network, reach_m: float, rng: np.random.Generator) -> W
         reach_m: How far the ego will drive, metres.
         rng: What is drawn comes from here.
     """
+    growing = rng.spawn(1)[0]
     along = network.ego_start + np.linspace(0, max(reach_m, 1.0), 12)
     terrain = shape_terrain(network, network.ego.at(along)[0], rng)
     plot, catalogue = Plot(network, terrain, rng), Catalogue(rng)
@@ -59,8 +61,9 @@ def build_world(network: Network, reach_m: float, rng: np.random.Generator) -> W
     site = Site(plot, catalogue)
     _fill_squares(plot, site)
     _plant_islands(plot, site)
-    for road in network.roads:
-        line_road(site, road, network.kind)
+    lined = [one for road in network.roads for one in line_road(site, road, network.kind)]
+    plot.rng = growing
+    overgrow(Site(plot, catalogue.drawing_from(growing)), lined, network.ego.at(along)[0])
     ground = [ground_mesh(terrain, network, rng), kerb_mesh(terrain, network, rng)]
     background = merge([*ground, *plot.parts])
     parked = [still.model.mesh.posed(still.world_from_object) for still in plot.stills]

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lidaraccum.data.frame import Labels
 from lidaraccum.errors import InputError, SettingsError
 from lidaraccum.io.sequences import open_sequence
 from lidaraccum.model.network import Network
@@ -16,7 +17,7 @@ from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.simulation.drive import simulate
 from lidaraccum.simulation.windows import TEST_WINDOWS, held_out_numbers, held_out_settings
 from lidaraccum.training.scores import Scores, score_network
-from lidaraccum.training.truth import window_of
+from lidaraccum.training.truth import make_window, window_of
 from lidaraccum.training.window import Batch, make_batch
 
 WINDOW = 5
@@ -90,9 +91,17 @@ def simulated_windows(count: int, extent_m: float, settings: NetworkSettings) ->
 
 
 def recorded_windows(
-    folder: Path, count: int, extent_m: float, settings: NetworkSettings
+    folder: Path, count: int, extent_m: float, settings: NetworkSettings, *, classed: bool = False
 ) -> Iterator[Batch]:
     """Windows spread evenly over a labelled drive, as its files are.
+
+    Args:
+        folder: The drive.
+        count: Windows at most.
+        extent_m: Side of the grid, metres.
+        settings: The network's.
+        classed: Points whose ``semantic`` class is 0 or less, nothing or unknown, count as not
+            annotated, as in SemanticKITTI's own benchmark; else the file's ``annotated`` decides.
 
     Raises:
         InputError: The drive cannot be read, or is shorter than a window.
@@ -102,5 +111,17 @@ def recorded_windows(
         raise InputError(f"{folder} has {len(drive)} frames, too few for a window of {WINDOW}")
     starts = np.unique(np.linspace(0, len(drive) - WINDOW, count).astype(int)).tolist()
     for start in starts:
-        places = range(start, start + WINDOW)
-        yield make_batch([window_of(drive, places, settings, extent_m)])
+        frames = [(drive[place], drive.labels(place)) for place in range(start, start + WINDOW)]
+        if classed:
+            frames = [(frame, _classed_alone(labels)) for frame, labels in frames]
+        yield make_batch([make_window(frames, 0, settings, extent_m)])
+
+
+def _classed_alone(labels: Labels) -> Labels:
+    """Labels of which only points of a named class are annotated."""
+    if labels.semantic is None:
+        return labels
+    named = labels.semantic > 0
+    return replace(
+        labels, annotated=named if labels.annotated is None else named & labels.annotated
+    )
