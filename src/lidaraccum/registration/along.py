@@ -98,11 +98,11 @@ class SteadyMotion:
 
         looks = np.arange(-reach_m, reach_m + STEP_M / 2, STEP_M)
         coarse = seen(looks)
-        mean = np.array([np.nanmean(one) for one in coarse])
+        mean = np.array([_mean_known(one) for one in coarse])
         middle = looks[int(np.argmax(mean))]
         finer = np.arange(middle - STEP_M, middle + STEP_M, FINE_STEP_M)
         fine = seen(finer)
-        at = int(np.argmax([np.nanmean(one) for one in fine]))
+        at = int(np.argmax([_mean_known(one) for one in fine]))
         apart = np.flatnonzero(np.abs(looks - finer[at]) > APART_M)
         rival = coarse[apart[int(np.argmax(mean[apart]))]] if len(apart) else fine[at]
         poses = self._poses(rails, places, float(finer[at]))
@@ -139,3 +139,9 @@ class SteadyMotion:
         share = (place - places[after - 1]) / (places[after] - places[after - 1])
         twists = rails[after - 1] + share * (rails[after] - rails[after - 1])
         return [rigid.exponential(twist) for twist in twists]
+
+
+def _mean_known(agreement: NDArray[np.float64]) -> float:
+    """The mean of what sight lines say; less than any where they say nothing."""
+    known = agreement[np.isfinite(agreement)]
+    return float(known.mean()) if len(known) else -np.inf
