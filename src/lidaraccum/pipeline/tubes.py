@@ -184,11 +184,11 @@ def _centroid_velocity(group: _Group, frames: Sequence[SightedFrame]) -> NDArray
     """Velocity (3,) at which the points' centre goes from frame to frame; NaN in one alone."""
     weight = np.array([float(len(picked)) for picked in group.values()])
     seconds = np.array([frames[place].stamp for place in group])
+    if np.ptp(seconds) == 0:
+        return np.full(3, np.nan)
     centres = np.array([frames[place].world(rows).mean(axis=0) for place, rows in group.items()])
     seconds = seconds - np.average(seconds, weights=weight)
     spread = (weight * seconds**2).sum()
-    if spread <= 0:
-        return np.full(3, np.nan)
     return ((weight * seconds) @ centres / spread) * (1.0, 1.0, 0.0)
 
 
