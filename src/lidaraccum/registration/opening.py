@@ -29,11 +29,14 @@ UNCLEAR = 1.0
 SETTLED_M, SETTLED_RAD = 0.02, 0.001
 """The first frames are solved again as long as the first motion changes by more."""
 
-CLEARLY_BETTER = 0.96
-"""Of two clocks one leaves less than this share of the other's distances to the map."""
+CLEARLY_BETTER = 0.98
+"""Of two clocks one leaves less than this share of the other's misfit."""
 
 NO_WORSE = 1.0
 """The share where the points say nothing of the clock."""
+
+LEAST_OVERLAP = 1e-3
+"""Frames of which no more fits than this fit nowhere, whatever is near."""
 
 Indexed = tuple[int, Frame]
 
@@ -82,11 +85,11 @@ class Opening:
 
         Equal steps of azimuth are seen from the sensor's place only, and on one sensor's beams:
         points in a vehicle's coordinates look as if compensated, two stacked sensors tell nothing.
-        Distances to the map must be less than a share of those without the times.
+        The misfit must be less than a share of that without the times.
         """
         by_times = self._settled(passed, timed)
         without = self._settled(passed, seeming)
-        if _mean_residual(by_times) > share * _mean_residual(without):
+        if _misfit(by_times) > share * _misfit(without):
             return without
         return self._run(timed, self._first_twist(by_times))
 
@@ -199,9 +202,14 @@ def _adrift(frame: RegisteredFrame) -> RegisteredFrame:
     return replace(frame, quality=replace(frame.quality, doubts=(*doubts, ADRIFT)))
 
 
-def _mean_residual(registered: list[RegisteredFrame]) -> float:
-    """Of all frames but the first, which has nothing to lie on."""
-    return float(np.mean([one.quality.residual_m for one in registered[1:]]))
+def _misfit(registered: list[RegisteredFrame]) -> float:
+    """Metres between points and map, more where fewer points lie on it at all.
+
+    The distances alone are those of points that fit: what fits badly leaves them, and they shrink.
+    The first frame has nothing to lie on.
+    """
+    distance = float(np.mean([one.quality.residual_m for one in registered[1:]]))
+    return distance / max(_mean_overlap(registered), LEAST_OVERLAP)
 
 
 def _mean_overlap(registered: list[RegisteredFrame]) -> float:
