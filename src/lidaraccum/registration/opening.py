@@ -29,7 +29,7 @@ UNCLEAR = 1.0
 SETTLED_M, SETTLED_RAD = 0.02, 0.001
 """The first frames are solved again as long as the first motion changes by more."""
 
-CLEARLY_BETTER = 0.98
+CLEARLY_BETTER = 0.99
 """Of two clocks one leaves less than this share of the other's misfit."""
 
 NO_WORSE = 1.0
