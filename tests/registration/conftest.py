@@ -156,6 +156,7 @@ class World:
     drive = staticmethod(drive)
     shuffled = staticmethod(shuffled)
     compensated = staticmethod(compensated)
+    sensor = Spinner()
     rolling = Spinner(rolling=True)
     dense = Spinner(beams=64, columns=800)
 

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
+
+from lidaraccum.geometry import rigid
 
 DEFAULT_INTERVAL_S = 0.1
 ROUNDING = 0.12
@@ -39,3 +44,16 @@ class Pace:
         steps = (later_s - earlier_s) / self.interval_s
         whole = max(round(steps), 1)
         return float(whole) if abs(steps - whole) <= ROUNDING * whole else min(steps, MAX_STEPS)
+
+    def twists(self, stamps: Sequence[float], poses: Sequence[rigid.Pose]) -> NDArray[np.float64]:
+        """Motion (T - 1, 6) over one interval from each of T poses, world_from_sensor, to the next.
+
+        Args:
+            stamps: T, seconds.
+            poses: T.
+        """
+        twists = []
+        for (earlier, one), (later, two) in pairwise(zip(stamps, poses, strict=True)):
+            between = rigid.invert(one) @ two
+            twists.append(rigid.logarithm(between) / self.steps(earlier, later))
+        return np.stack(twists)
