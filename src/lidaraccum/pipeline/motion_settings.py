@@ -100,13 +100,20 @@ class MotionSettings:
 
 
 CONSERVATIVE = MotionSettings(
-    margin=0.4, max_cost=0.4, min_through=0.25, min_points=15, sure_margin=9.0, box_growth=1.0
+    margin=0.4,
+    max_cost=0.4,
+    min_through=0.25,
+    shown=0.5,
+    min_points=15,
+    sure_margin=9.0,
+    box_growth=1.0,
 )
 BALANCED = MotionSettings()
 AGGRESSIVE = MotionSettings(
     margin=0.2,
     max_cost=0.6,
     min_through=0.05,
+    shown=0.2,
     min_points=5,
     seeds=2,
     sure_margin=0.0,
