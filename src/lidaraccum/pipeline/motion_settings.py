@@ -6,15 +6,16 @@ from dataclasses import dataclass, replace
 
 from lidaraccum.errors import SettingsError
 
-SURE = 0.5
+LIKELY, SURE = 0.5, 0.8
 TRUSTED_MARGIN = 0.2
 TRUSTED_COST = 0.65
 TRUSTED_SHARE = 0.85
 TRUSTED_WAY = 0.5
-TRUSTED_SHOWN = 0.08
-"""Where a proposer is so sure that something moves, this share of the margin is enough and this
-cost is allowed if it is less than this share of standing still; so is this share of the way. So
-much of it must be shown, not hidden: a wall that comes into view may have come from anywhere."""
+TRUSTED_SHOWN, LIKELY_SHOWN = 0.08, 0.2
+"""Where a proposer thinks it so likely that something moves, this share of the margin is enough and
+this cost is allowed if it is less than this share of standing still; so is this share of the way.
+So much of it must be shown, not hidden, less where he is sure: a wall that comes into view may have
+come from anywhere."""
 
 
 @dataclass(frozen=True)
@@ -82,8 +83,8 @@ class MotionSettings:
                 f"windows must share a frame: stride {self.stride}, window {self.window}"
             )
 
-    def trusting(self) -> MotionSettings:
-        """What a mover must show whose proposer is sure of it: less, but never nothing.
+    def trusting(self, trust: float) -> MotionSettings:
+        """What a mover must show whose proposer trusts it so much, 0..1: less, but never nothing.
 
         Moving must still explain the points better than standing, but nobody need have seen
         through its place.
@@ -95,7 +96,7 @@ class MotionSettings:
             max_share=TRUSTED_SHARE,
             min_shift_m=TRUSTED_WAY * self.min_shift_m,
             min_through=-1.0,
-            min_shown=TRUSTED_SHOWN,
+            min_shown=TRUSTED_SHOWN if trust >= SURE else LIKELY_SHOWN,
         )
 
 

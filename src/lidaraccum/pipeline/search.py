@@ -12,7 +12,7 @@ from lidaraccum.pipeline.courses import are_alike
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.gathering import WHOLE_GROWTH, with_middle
 from lidaraccum.pipeline.hypotheses import propose
-from lidaraccum.pipeline.motion_settings import SURE, MotionSettings
+from lidaraccum.pipeline.motion_settings import LIKELY, MotionSettings
 from lidaraccum.pipeline.objects import Expectation, WindowObject, explain, join_parts, stands
 from lidaraccum.pipeline.suspects import Lead, Suspect, find_suspects
 
@@ -66,8 +66,8 @@ def find_objects(
             proposed.add(_outlined(found, lead, frames) if found else None)
     movers = _settle(proposed.objects, free, frames, BETTER_SHARE)
     for lead in leads:
-        if lead.trust >= SURE and _Claimed(frames, movers).share(lead.suspect) <= KNOWN_SHARE:
-            trusting = settings.trusting()
+        if lead.trust >= LIKELY and _Claimed(frames, movers).share(lead.suspect) <= KNOWN_SHARE:
+            trusting = settings.trusting(lead.trust)
             found = _explain_lead(lead, frames, trusting, expected)
             if found is None:  # its proposer may be right that it moves and wrong how
                 proposals = propose(lead.suspect, suspects, frames, settings)
