@@ -17,6 +17,10 @@ from lidaraccum.pipeline.shape import ObjectShape
 LOW_REACH_M = 0.2
 """Low points this near to a mover's obstacles, seen from above, are its wheels and shoes."""
 
+MOST_MISSED = 1.5
+"""A frame that shows less of a mover than its fullest is filled up as if it showed so many times
+what it does: it may have missed some, a wall beside it is more."""
+
 LOST_FRAMES = 3
 FOUND_M = 0.25
 FOUND_SHARE = 0.5
@@ -182,13 +186,15 @@ def _note(track: Track, frame: SightedFrame, pose: rigid.Pose, points: int) -> N
 def _in_box(track: Track, frame: SightedFrame, growth: float) -> NDArray[np.int64]:
     """The frame's obstacles (K,) within the mover's box, where nothing else can be.
 
-    None at all when they would outnumber those known to be its own: then the box is wrong.
+    None at all when they would outnumber those known to be its own, in this frame and in its
+    fullest: then the box is wrong.
     """
     assert track.shape is not None
     velocity = track.velocities[frame.index]
     about = _about_shape(track.shape, track.world_from_object, frame, velocity)
     inside = track.shape.holds(_own_places(track.world_from_object, frame, about, velocity))
-    return about[inside] if inside.sum() < growth * track.most_points else _NONE
+    most = growth * min(track.most_points, MOST_MISSED * track.points)
+    return about[inside] if inside.sum() < most else _NONE
 
 
 def _near_shape(
