@@ -11,6 +11,7 @@ from lidaraccum.data.frame import Frame
 from lidaraccum.geometry import rigid
 from lidaraccum.registration.odometry import register
 from lidaraccum.registration.quality import ADRIFT
+from lidaraccum.registration.settings import RegistrationSettings
 from lidaraccum.registration.sightlines import Sightlines, gain
 from lidaraccum.simulation.drive import simulate
 from lidaraccum.simulation.settings import DriveSettings
@@ -52,6 +53,22 @@ def test_a_start_at_speed_in_a_tunnel_is_no_standing_still(seed: int) -> None:
     found = list(register(drive[index] for index in range(5)))[-1].world_from_sensor
     error = rigid.invert(rigid.invert(first) @ last) @ found
     assert np.linalg.norm(error[:3, 3]) < 0.2
+
+
+@pytest.mark.parametrize(("lookahead", "spoilt"), [(7, None), (5, 2)])
+def test_however_many_frames_open_and_though_one_is_lost(
+    lookahead: int, spoilt: int | None
+) -> None:
+    drive = simulate(DriveSettings(seed=7008, scene="tunnel", speed_mps=20.0, frames=7))
+    frames = [drive[index] for index in range(len(drive))]
+    if spoilt is not None:
+        noise = np.random.default_rng(0).uniform(-60, 60, frames[spoilt].points.shape)
+        frames[spoilt] = frames[spoilt].with_points(noise.astype(np.float32))
+    found = list(register(frames, RegistrationSettings(lookahead=lookahead)))
+    first, last = (drive.labels(index).world_from_sensor for index in (0, 6))
+    error = rigid.invert(rigid.invert(first) @ last) @ found[-1].world_from_sensor
+    assert np.linalg.norm(error[:3, 3]) < 0.3
+    assert spoilt is None or found[spoilt].quality.doubts
 
 
 def points_of(moving: Any, index: int) -> np.ndarray:

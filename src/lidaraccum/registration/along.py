@@ -32,7 +32,6 @@ SURE = 3.0
 APART_M = 0.3
 """Motions differ, along the way, from here on."""
 
-COARSE_POINTS = 1200
 STATION_M, STEP_M, FINE_STEP_M = 1.0, 0.1, 0.02
 """Steps along the way: between alignments, between looks, between the last looks."""
 

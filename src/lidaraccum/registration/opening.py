@@ -55,7 +55,8 @@ class Opening:
         passed = self._solve()
         open_axes = self._passage.tracker.open_axes
         if self._passage.given is None and 2 * len(open_axes) >= len(passed):
-            return self._freed(passed)
+            passed = self._freed(passed)
+        self._passage.tracker.forget_opening()
         return passed
 
     def _solve(self) -> list[RegisteredFrame]:
@@ -163,15 +164,14 @@ class Opening:
 
     def _steady_motion(self, passed: list[RegisteredFrame]) -> SteadyMotion:
         passage = self._passage
-        sights = list(passage.tracker.sights)[: len(passed)]
         stamps = [one.frame.stamp for one in passed]
         steps = [passage.pace.steps(*pair) for pair in pairwise(stamps)]
         surface = SurfaceMap(passage.settings.voxel_m, passage.settings.max_range_m * 1.1)
-        surface.insert(sights[0].points, now=0)
+        surface.insert(passage.tracker.sights[0].points, now=0)
         # Which way it points may differ, and one frame may err.
         axes = np.stack(passage.tracker.open_axes)
         axis = passed[0].world_from_sensor[:3, :3].T @ np.linalg.eigh(axes.T @ axes)[1][:, 2]
-        return SteadyMotion(sights, np.cumsum([0.0, *steps]), surface, axis)
+        return SteadyMotion(list(passage.tracker.sights), np.cumsum([0.0, *steps]), surface, axis)
 
     def _first_twist(self, passed: list[RegisteredFrame]) -> NDArray[np.float64]:
         """Motion at the first frame: the first step, unless the next ones disagree with it."""

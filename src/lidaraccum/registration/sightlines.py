@@ -34,6 +34,9 @@ WIDEST_GAP_ROWS = 16
 MIN_COLUMNS = 2
 """Columns with beams, of the three about a place, below which nothing is known about it."""
 
+MOST_POINTS = 1200
+"""So many points of a frame are looked at from another, up to twice as many."""
+
 MARGIN_M, MARGIN_PER_M = 0.1, 0.01
 """A point so far from what was seen (and so much more per metre of range) contradicts it."""
 
@@ -104,14 +107,14 @@ class Sight:
     Attributes:
         frame: Its points at the stamp.
         usable: (N,) bool: those that registration may use.
-        few: (M, 3) float64 a thin choice of them, metres, sensor coordinates.
+        rows: (M,) int64: a thin choice of them.
         world_from_sensor: (4, 4).
         eye: Shared by the frames of a sensor.
     """
 
     frame: Frame
     usable: BoolArray
-    few: NDArray[np.float64]
+    rows: NDArray[np.int64]
     world_from_sensor: rigid.Pose
     eye: Eye
 
@@ -119,6 +122,12 @@ class Sight:
     def points(self) -> NDArray[np.float64]:
         """(N, 3) usable points, metres, sensor coordinates."""
         return self.frame.points[self.usable].astype(np.float64)
+
+    @cached_property
+    def few(self) -> NDArray[np.float64]:
+        """(K, 3) of the thin choice, about `MOST_POINTS`, metres, sensor coordinates."""
+        rows = self.rows[:: max(1, len(self.rows) // MOST_POINTS)]
+        return self.frame.points[rows].astype(np.float64)
 
     @cached_property
     def lines(self) -> Sightlines:

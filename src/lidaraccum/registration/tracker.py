@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from lidaraccum.data.frame import BoolArray, Frame
 from lidaraccum.data.registered import RegisteredFrame, RegistrationQuality
 from lidaraccum.geometry import rigid
-from lidaraccum.registration.along import COARSE_POINTS, open_axis
+from lidaraccum.registration.along import open_axis
 from lidaraccum.registration.deskew import SweepClock
 from lidaraccum.registration.icp import align, assess
 from lidaraccum.registration.locate import Hypothesis, Located, proposed, refine, search
@@ -34,9 +33,6 @@ SAME_TWIST_M, SAME_TWIST_RAD = 0.02, 0.0005
 
 MAX_PASSES = 3
 MAX_REACH_M = 60.0
-
-SIGHTS = 4
-"""Frames whose sight lines the next one is compared with where planes leave a direction open."""
 
 PATIENCE = 3
 """Frames in a row that may be left out of the map as lost before the map starts anew."""
@@ -99,8 +95,13 @@ class Tracker:
         self._first_origin = np.zeros(3)
         self._lost = 0
         self._eye = Eye()
-        self.sights: deque[Sight] = deque(maxlen=SIGHTS + 1)
+        self.sights: list[Sight] = []
         self.open_axes: list[NDArray[np.float64]] = []
+
+    def forget_opening(self) -> None:
+        """Let go of what only the first frames are solved with."""
+        self.sights.clear()
+        self.open_axes.clear()
 
     def start(self, index: int, raw: Frame, usable: BoolArray, pose: rigid.Pose) -> RegisteredFrame:
         """Put the first frame on the empty map."""
@@ -203,19 +204,16 @@ class Tracker:
 
     def _look_along(self, scan: Scan, located: Located, steps: float) -> None:
         """Note the direction that planes leave open, if they do."""
-        if scan.raw.origin.any() or scan.index >= self._settings.lookahead:
+        if scan.raw.origin.any() or not self._opens(scan):
             return
         pose = located.alignment.world_from_sensor
         axis = open_axis(self._surface, scan.source(self._twist_to(pose, steps)), pose)
         if axis is not None:
             self.open_axes.append(axis)
 
-    def _sight(
-        self, scan: Scan, frame: Frame, twist: NDArray[np.float64], pose: rigid.Pose
-    ) -> Sight:
-        source = scan.source(twist)
-        few = source[:: max(1, len(source) // COARSE_POINTS)]
-        return Sight(frame, scan.usable, few, pose, self._eye)
+    def _opens(self, scan: Scan) -> bool:
+        """Whether a frame is one of the first, which are solved together."""
+        return scan.index < self._settings.lookahead
 
     def _is_smooth(self, found: Located, start: Hypothesis, steps: float) -> bool:
         interval_s = steps * self._pace.interval_s
@@ -250,7 +248,6 @@ class Tracker:
     ) -> RegisteredFrame:
         frame = scan.straightened(twist)
         self._surface.insert(rigid.transform(pose, frame.points[scan.usable]), scan.index)
-        self.sights.append(self._sight(scan, frame, twist, pose))
         self._surface.forget_far(pose[:3, 3], scan.index)
         self._last = Fix(scan.index, frame.stamp, pose)
         return self._registered(scan, frame, pose, quality)
@@ -258,6 +255,8 @@ class Tracker:
     def _registered(
         self, scan: Scan, frame: Frame, pose: rigid.Pose, quality: RegistrationQuality
     ) -> RegisteredFrame:
+        if self._opens(scan):
+            self.sights.append(Sight(frame, scan.usable, scan.rows, pose, self._eye))
         seconds = None if self._settings.deskew == "off" else scan.seconds_from_stamp
         return RegisteredFrame(
             scan.index,
