@@ -8,12 +8,11 @@ import pytest
 from lidaraccum.data.frame import Frame
 from lidaraccum.data.registered import RegisteredFrame, RegistrationQuality
 from lidaraccum.geometry import rigid
-from lidaraccum.pipeline.courses import carried
+from lidaraccum.pipeline.courses import course
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.landing import land
 from lidaraccum.pipeline.motion_settings import BALANCED
 from lidaraccum.pipeline.suspects import Template
-from lidaraccum.pipeline.verdict import as_met
 
 
 def frame_at(stamp: float, *, timed: bool) -> SightedFrame:
@@ -33,6 +32,16 @@ def frame_at(stamp: float, *, timed: bool) -> SightedFrame:
     return SightedFrame(registered, BALANCED)
 
 
+def landed_alone(
+    template: Template, velocity: np.ndarray, turn: float, frame: SightedFrame
+) -> np.ndarray:
+    """Step by step: along the course, into the frame, and on while the sweep takes its time."""
+    course_of_it = course(template.pivot, velocity, turn, frame.stamp - template.stamp)
+    local = rigid.transform(frame.sensor_from_world @ course_of_it, template.world)
+    later = frame.seconds_at(local) - template.seconds if frame.is_timed else np.zeros(len(local))
+    return local + later[:, None] * (velocity @ frame.sensor_from_world[:3, :3].T)
+
+
 @pytest.mark.parametrize("timed", [False, True])
 @pytest.mark.parametrize("turns", [(0.0, 0.0, 0.0), (0.0, 0.4, -1.0)])
 def test_hypotheses_land_as_each_alone(timed: bool, turns: tuple[float, ...]) -> None:
@@ -43,6 +52,5 @@ def test_hypotheses_land_as_each_alone(timed: bool, turns: tuple[float, ...]) ->
     frame = frame_at(0.3, timed=timed)
     landed = land(template, velocities, np.array(turns), frame)
     for row, (velocity, turn) in enumerate(zip(velocities, turns, strict=True)):
-        moved = carried(world, template.pivot, velocity, turn, 0.3)
-        alone = as_met(moved, velocity, template.seconds, frame)
+        alone = landed_alone(template, velocity, turn, frame)
         np.testing.assert_allclose(landed[:, row].T, alone, atol=1e-9)

@@ -13,14 +13,14 @@ from lidaraccum.data.registered import RegisteredFrame, RegistrationQuality
 from lidaraccum.geometry import rigid
 from lidaraccum.pipeline.courses import course
 from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.landing import land
 from lidaraccum.pipeline.motion_settings import BALANCED
 from lidaraccum.pipeline.search import find_objects
 from lidaraccum.pipeline.suspects import Template, make_template
 from lidaraccum.pipeline.verdict import (
-    as_met,
     bend_course,
     judge,
-    refine_velocity,
+    refine_velocities,
     slide_velocity,
 )
 
@@ -69,7 +69,8 @@ def test_what_is_hidden_shows_nothing(frames: list[SightedFrame], car: Template)
 
 
 def test_a_rough_motion_is_refined(frames: list[SightedFrame], car: Template) -> None:
-    refined = refine_velocity(car, CAR_VELOCITY + np.array([0.8, 0.5, 0.0]), frames, BALANCED)
+    rough = (CAR_VELOCITY + np.array([0.8, 0.5, 0.0]))[None]
+    (refined,) = refine_velocities(car, rough, np.zeros(1), frames, BALANCED)
     assert np.linalg.norm(refined - CAR_VELOCITY) < 0.6
     assert refined[2] == 0
 
@@ -135,9 +136,8 @@ def test_a_turning_car_is_explained_by_its_turn(frames: list[SightedFrame]) -> N
     rivals = np.stack([np.zeros(3), velocity, velocity])
     cost = judge(template, rivals, turning, BALANCED, np.array([0.0, 0.0, turn])).cost
     assert cost[2] < 0.2 < cost[1] < cost[0]
-    refined = refine_velocity(
-        template, velocity + np.array([0.5, -0.4, 0.0]), turning, BALANCED, turn
-    )
+    rough = (velocity + np.array([0.5, -0.4, 0.0]))[None]
+    (refined,) = refine_velocities(template, rough, np.array([turn]), turning, BALANCED)
     np.testing.assert_allclose(refined, velocity, atol=0.2)
     bent, found = bend_course(template, velocity + np.array([0.3, -0.3, 0.0]), turning, BALANCED)
     assert abs(found - turn) < 0.3
@@ -189,10 +189,13 @@ def test_what_moves_is_met_when_the_sweep_comes_by() -> None:
     frame = SightedFrame(swept, BALANCED)
     velocity = np.array([15.0, 0.0, 0.0])
     ahead = np.array([[0.0, 8.0, 0.0]])  # a quarter turn after the stamp: 0.025 s
-    met = as_met(ahead, velocity, np.array([-0.01]), frame)
+    template = Template(ahead, np.zeros(1), 0.1, np.array([-0.01]), ahead[0])
+    met = land(template, velocity[None], np.zeros(1), frame)[:, 0].T
     np.testing.assert_allclose(met, ahead + velocity * (0.025 + 0.01), atol=0.03)
     untimed = SightedFrame(replace(swept, seconds_from_stamp=None), BALANCED)
-    np.testing.assert_array_equal(as_met(ahead, velocity, np.zeros(1), untimed), ahead)
+    timeless = replace(template, seconds=np.zeros(1))
+    met = land(timeless, velocity[None], np.zeros(1), untimed)[:, 0].T
+    np.testing.assert_array_equal(met, ahead)
     picked = np.arange(len(frame.rows))
     at_stamp = frame.world_at_stamp(picked, velocity)
     later = (frame.points - at_stamp)[:, 0] / 15.0

@@ -38,19 +38,6 @@ def are_alike(
     return bool(np.linalg.norm(other - one) < allowed)
 
 
-def carried(
-    points: NDArray[np.float64],
-    pivot: NDArray[np.float64],
-    velocity: NDArray[np.float64],
-    turn: float,
-    seconds: float,
-) -> NDArray[np.float64]:
-    """Points (N, 3) of a thing, world, so many seconds on its `course` later."""
-    if turn == 0:
-        return points + velocity * seconds
-    return rigid.transform(course(pivot, velocity, turn, seconds), points)
-
-
 def course(
     pivot: NDArray[np.float64], velocity: NDArray[np.float64], turn: float, seconds: float
 ) -> rigid.Pose:

@@ -11,11 +11,12 @@ from scipy.spatial import cKDTree
 
 from lidaraccum.geometry.clustering import connected_cells
 from lidaraccum.geometry.voxel import thin
-from lidaraccum.pipeline.courses import carried, turned
+from lidaraccum.pipeline.courses import turned
 from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.landing import land
 from lidaraccum.pipeline.motion_settings import MotionSettings
-from lidaraccum.pipeline.suspects import Suspect, Template
-from lidaraccum.pipeline.verdict import as_met, judge_points
+from lidaraccum.pipeline.suspects import Suspect, whole_template
+from lidaraccum.pipeline.verdict import judge_points
 
 JOIN_M = 0.4
 WHOLE_SHARE = 0.5
@@ -92,15 +93,14 @@ def _lain_on(
     whole_only: bool,
 ) -> dict[int, NDArray[np.int64]]:
     """By frame index: the obstacles (K,) of other frames that some of this one's, moved, lie on."""
-    world, heights = own.world(picked), own.heights[picked]
+    template, motion = whole_template(own, picked), (velocity[None], np.array([turn]))
     gathered = {}
     for frame in frames:
         if frame is own:
             continue
-        seconds = frame.stamp - own.stamp
-        moved = carried(world, world.mean(axis=0), velocity, turn, seconds)
-        local = as_met(moved, velocity, own.seconds[picked], frame)
-        found = _points_at(frame, frame.places(local, heights), whole_only=whole_only)
+        local = land(template, *motion, frame)[:, 0].T
+        places = frame.places(local, template.heights)
+        found = _points_at(frame, places, whole_only=whole_only)
         nearer = max(1.0, _mean_range(own.points[picked]) / max(_mean_range(local), 0.1))
         if 0 < len(found) < MOST_GROWTH * len(picked) * nearer**2:
             gathered[frame.index] = found
@@ -155,10 +155,7 @@ def without_standing(
         doubtful = mine[(frame.through[mine] == 0) & (frame.met[mine] > 0)]
         if len(doubtful) > STANDING_SHARE * len(mine):
             sample = doubtful[thin(frame.points[doubtful], 0.2)]
-            world = frame.world(sample)
-            template = Template(
-                world, frame.heights[sample], frame.stamp, frame.seconds[sample], world.mean(axis=0)
-            )
+            template = whole_template(frame, sample)
             rivals = np.stack([np.zeros(3), turned(velocity, turn * (frame.stamp - stamp))])
             cost, _ = judge_points(template, rivals, frames, settings, np.array([0.0, turn]))
             stands = cost[0] + margin < cost[1]

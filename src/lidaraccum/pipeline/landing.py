@@ -17,7 +17,8 @@ def land(
 ) -> NDArray[np.float64]:
     """Where a frame meets a cluster that moves, for each of H motions.
 
-    As `courses.carried` and then `verdict.as_met`, all hypotheses in one go.
+    Each is carried along its `courses.course` from stamp to stamp, and on by the time that the
+    sweep takes to come by.
 
     Args:
         template: The cluster, P points.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,8 +114,13 @@ def make_template(frame: SightedFrame, picked: NDArray[np.int64], count: int) ->
     kept = thin(frame.points[picked], 0.1)
     if len(kept) > count:
         kept = kept[np.linspace(0, len(kept) - 1, count).astype(np.int64)]
-    chosen = picked[kept]
-    centre = frame.world(picked).mean(axis=0)
+    pivot = frame.world(picked).mean(axis=0)
+    return replace(whole_template(frame, picked[kept]), pivot=pivot)
+
+
+def whole_template(frame: SightedFrame, picked: NDArray[np.int64]) -> Template:
+    """All of the picked obstacles (K,)."""
+    world = frame.world(picked)
     return Template(
-        frame.world(chosen), frame.heights[chosen], frame.stamp, frame.seconds[chosen], centre
+        world, frame.heights[picked], frame.stamp, frame.seconds[picked], world.mean(axis=0)
     )

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidaraccum.geometry import rigid
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.landing import land, nearest
 from lidaraccum.pipeline.motion_settings import MotionSettings
@@ -44,8 +43,8 @@ class Verdict:
     Attributes:
         cost: Truncated distance to the nearest partner over the gate, see `MotionSettings`.
         through: Share of points without partner in places that the frame saw through.
-        shown: How much more the first hypothesis costs, summed where neither puts a point into a
-            place that is hidden from the frame: what is seen of it, not what may be.
+        shown: How much more the first hypothesis costs, where one of the two puts a point into a
+            place that is hidden from the frame counted as nothing: what is seen, not what may be.
     """
 
     cost: NDArray[np.float64]
@@ -118,7 +117,7 @@ def slide_velocity(
     settings: MotionSettings,
     turn: float = 0.0,
 ) -> NDArray[np.float64]:
-    """The velocity (3,) of the same course that costs least: what `refine_velocity` is blind to."""
+    """The velocity (3,) of the same course that costs least: refining is blind to it."""
     span = max(abs(frame.stamp - template.stamp) for frame in frames)
     speed = float(np.linalg.norm(velocity))
     if speed == 0 or span == 0:
@@ -165,41 +164,6 @@ def bend_course(
             break
         tried = best[1] * np.array(FINER)
     return best
-
-
-def as_met(
-    moved: NDArray[np.float64],
-    velocity: NDArray[np.float64],
-    seconds: NDArray[np.float64],
-    frame: SightedFrame,
-) -> NDArray[np.float64]:
-    """Where a frame meets points of a mover: a sweep takes time, and the mover goes on meanwhile.
-
-    Args:
-        moved: (..., N, 3) metres, world: the points, moved from stamp to stamp.
-        velocity: (..., 1, 3) or (3,) m/s, world.
-        seconds: (N,) after its own frame's stamp, when each was met.
-        frame: Who meets them.
-
-    Returns:
-        (..., N, 3) metres, sensor coordinates.
-    """
-    local = rigid.transform(frame.sensor_from_world, moved.reshape(-1, 3)).reshape(moved.shape)
-    if not frame.is_timed:
-        return local
-    later = frame.seconds_at(local.reshape(-1, 3)).reshape(moved.shape[:-1]) - seconds
-    return np.asarray(local + later[..., None] * (velocity @ frame.sensor_from_world[:3, :3].T))
-
-
-def refine_velocity(
-    template: Template,
-    velocity: NDArray[np.float64],
-    frames: Sequence[SightedFrame],
-    settings: MotionSettings,
-    turn: float = 0.0,
-) -> NDArray[np.float64]:
-    """`refine_velocities` for one velocity (3,)."""
-    return refine_velocities(template, velocity[None], np.array([turn]), frames, settings)[0]
 
 
 def refine_velocities(
