@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from lidaraccum.simulation.barriers import boards, pickets, railing, wall, wire_mesh
 from lidaraccum.simulation.mesh import Finish, Mesh, blob, box, flakes, grid, merge, rod
 from lidaraccum.simulation.surfaces import Surface
+from lidaraccum.simulation.vegetation import on_line, shell
 
 Array = NDArray[np.float64]
 Barrier = Callable[[Array, np.random.Generator], Mesh]
@@ -27,17 +28,10 @@ def _leaf(rng: np.random.Generator, surface: Surface = Surface.HEDGE) -> Finish:
     return Finish(surface, float(rng.uniform(0.2, 0.65)))
 
 
-def _ball(count: int, rng: np.random.Generator, inner: float) -> Array:
-    """Points (N, 3) in a unit ball, outside its ``inner`` share."""
-    direction = rng.standard_normal((count, 3))
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    return direction * rng.uniform(inner**3, 1.0, (count, 1)) ** (1 / 3)
-
-
 def _clump(radii: Array, middle: Array, leaf: Finish, rng: np.random.Generator) -> Mesh:
     """Loose leaves in an ellipsoid (radii and middle (3,), metres), dense ones over a core."""
     count = int(np.clip(70 * radii[0] * radii[2] + 60 * radii[1] * radii[2] + 30, 40, 350))
-    centres = middle + _ball(count, rng, 0.55) * radii
+    centres = middle + shell(count, rng, 0.55) * radii
     centres = centres[centres[:, 2] > 0.02]
     leaves = flakes(centres, rng.uniform(0.05, 0.2, len(centres)), leaf, rng)
     if rng.random() < 0.5:
@@ -133,10 +127,8 @@ def grown_over(line: Array, rng: np.random.Generator) -> Mesh:
     length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
     count = int(np.clip(rng.uniform(15, 50) * length * height, 30, 1500))
     at = rng.uniform(0, len(line) - 1.001, count)
-    low, share = at.astype(int), (at - at.astype(int))[:, None]
-    base = line[low] * (1 - share) + line[low + 1] * share
     thick = rng.uniform(0.05, 0.5) * (0.4 + 0.6 * np.sin(at * rng.uniform(0.4, 1.5)) ** 2)
-    centres = base + np.stack(
+    centres = on_line(line, at) + np.stack(
         [*(rng.normal(0, 1, (2, count)) * thick), height * rng.uniform(0, 1, count) ** 0.8], axis=1
     )
     return merge([carrier, flakes(centres, rng.uniform(0.04, 0.15, count), _leaf(rng), rng)])

@@ -15,11 +15,17 @@ def _leaf(rng: np.random.Generator, surface: Surface = Surface.LEAVES) -> Finish
     return Finish(surface, float(rng.uniform(0.25, 0.65)))
 
 
-def _shell(count: int, rng: np.random.Generator, inner: float) -> Array:
+def shell(count: int, rng: np.random.Generator, inner: float) -> Array:
     """Points (N, 3) in a unit ball, outside its ``inner`` share."""
     direction = rng.standard_normal((count, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     return direction * rng.uniform(inner**3, 1.0, (count, 1)) ** (1 / 3)
+
+
+def on_line(line: Array, at: Array) -> Array:
+    """Points (N, 3) at places (N,) on a line (K, 3), counted in its points, below K - 1."""
+    low, share = at.astype(int), (at - at.astype(int))[:, None]
+    return line[low] * (1 - share) + line[low + 1] * share
 
 
 def broadleaf(rng: np.random.Generator) -> Mesh:
@@ -39,7 +45,7 @@ def broadleaf(rng: np.random.Generator) -> Mesh:
             [out * np.cos(angle), out * np.sin(angle), rng.uniform(bole + 0.4, 0.85 * height)]
         )
         radii = np.array([0.55, 0.55, 0.5]) * width * rng.uniform(0.6, 1.1)
-        centres = middle + _shell(leaves // clumps, rng, 0.3) * radii
+        centres = middle + shell(leaves // clumps, rng, 0.3) * radii
         centres = centres[centres[:, 2] > bole * 0.8]
         parts.append(flakes(centres, rng.uniform(0.6, 1.4, len(centres)) * size, leaf, rng))
         parts.append(rod((0, 0, bole), middle, 0.4 * radius, bark))
@@ -71,7 +77,7 @@ def young_tree(rng: np.random.Generator) -> Mesh:
         for x, y in ((0.4, 0.0), (-0.4, 0.0), (0.0, 0.4))[: rng.integers(0, 4)]
     ]
     middle = np.array([0, 0, 0.72 * height])
-    centres = middle + _shell(220, rng, 0.1) * np.array([0.9, 0.9, 0.3 * height])
+    centres = middle + shell(220, rng, 0.1) * np.array([0.9, 0.9, 0.3 * height])
     parts.append(flakes(centres, rng.uniform(0.08, 0.2, 220), _leaf(rng), rng))
     return merge(parts)
 
@@ -107,7 +113,7 @@ def bush(rng: np.random.Generator, height: float | None = None) -> Mesh:
         radii = np.array([*(tall * rng.uniform(0.4, 0.9, 2)), 0.5 * tall])
         shift = np.array([*(rng.uniform(-0.7, 0.7, 2) * height), 0.5 * tall])
         core = blob(tuple(0.72 * radii), tuple(shift), leaf, rng, 0.12)
-        centres = shift + _shell(int(50 + 80 * tall), rng, 0.75) * radii
+        centres = shift + shell(int(50 + 80 * tall), rng, 0.75) * radii
         parts += [core, flakes(centres, rng.uniform(0.05, 0.2, len(centres)), leaf, rng)]
     return merge(parts)
 
@@ -138,13 +144,12 @@ def hedge(line: Array, rng: np.random.Generator) -> Mesh:
     length = float(np.linalg.norm(line[-1] - line[0]))
     count = int(min(45 * length * (height + 0.5 * width), 5000))
     at = rng.uniform(0, len(line) - 1.001, count)
-    low, share = at.astype(int), (at - at.astype(int))[:, None]
-    base = line[low] * (1 - share) + line[low + 1] * share
+    base = on_line(line, at)
     pick = rng.uniform(0, 6, count)
     first, part = pick.astype(int), pick - pick.astype(int)
     spot = outline[first] * (1 - part)[:, None] + outline[first + 1] * part[:, None]
     out = 1 + neat * rng.standard_normal((count, 2))
-    centres = base + (spot[:, :1] * width * out[:, :1]) * left[low]
+    centres = base + (spot[:, :1] * width * out[:, :1]) * left[at.astype(int)]
     centres[:, 2] += spot[:, 1] * height * out[:, 1]
     ends = [fan(ring[0], leaf), fan(ring[-1], leaf)]
     return merge(
