@@ -264,10 +264,11 @@ def _goes_as_sensor(
     """
     before = frames[max(suspect.frame - 1, 0)]
     after = frames[min(suspect.frame + 1, len(frames) - 1)]
+    seconds = after.stamp - before.stamp
     way = after.world_from_sensor[:3, 3] - before.world_from_sensor[:3, 3]
     speed = float(np.linalg.norm(velocity))
-    sensor_mps = float(way @ velocity) / speed / (after.stamp - before.stamp)
-    return abs(sensor_mps - speed) < AS_SENSOR_MPS + AS_SENSOR_SHARE * speed
+    apart_m = abs(float(way @ velocity) / speed - speed * seconds)
+    return apart_m < (AS_SENSOR_MPS + AS_SENSOR_SHARE * speed) * seconds
 
 
 def join_parts(

@@ -64,19 +64,9 @@ class Canvas:
         if label == MOVING:
             self._poses[track.instance] = track.world_from_object
 
-    def paint_close(self, track: Track) -> None:
-        """Give a mover what is on its shape and so close that it might be the carrier's."""
-        close = self._frame.close_points
-        if len(close) == 0 or track.shape is None:
-            return
-        velocity = track.velocities[self._frame.index]
-        seconds = self._frame.seconds_at(close)
-        world = rigid.transform(self._frame.world_from_sensor, close) - seconds[:, None] * velocity
-        own = rigid.transform(rigid.invert(track.world_from_object), world)
-        on = track.shape.holds(own) & np.isfinite(track.shape.distances(own, FOUND_M))
-        if on.sum() < FOUND_GROWTH * track.most_points:
-            self._paint_rows(track, self._frame.close_rows[on], MOVING)
-            track.shape.add(own[on])
+    def paint_close(self, track: Track, chosen: NDArray[np.bool_]) -> None:
+        """Give a mover those of the close points that are chosen (C,)."""
+        self._paint_rows(track, self._frame.close_rows[chosen], MOVING)
 
     def paint_still(
         self, rows: NDArray[np.int64], instance: int, confidence: NDArray[np.float32]
@@ -122,7 +112,7 @@ def paint_mover(track: Track, frame: SightedFrame, canvas: Canvas, box_growth: f
         canvas.paint(
             track, np.union1d(picked, canvas.free(_in_box(track, frame, box_growth))), MOVING
         )
-        canvas.paint_close(track)
+        _take_close(track, frame, canvas)
         return
     if track.shape is None or frame.index - track.last_index > LOST_FRAMES:
         return
@@ -195,6 +185,21 @@ def _in_box(track: Track, frame: SightedFrame, growth: float) -> NDArray[np.int6
     inside = track.shape.holds(_own_places(track.world_from_object, frame, about, velocity))
     most = growth * min(track.most_points, MOST_MISSED * track.points)
     return about[inside] if inside.sum() < most else _NONE
+
+
+def _take_close(track: Track, frame: SightedFrame, canvas: Canvas) -> None:
+    """Give a mover what is on its shape and so close that it might be the carrier's."""
+    close = frame.close_points
+    if len(close) == 0:
+        return
+    assert track.shape is not None
+    late = frame.seconds_at(close)[:, None] * track.velocities[frame.index]
+    world = rigid.transform(frame.world_from_sensor, close) - late
+    own = rigid.transform(rigid.invert(track.world_from_object), world)
+    on = track.shape.holds(own) & np.isfinite(track.shape.distances(own, FOUND_M))
+    if on.sum() < FOUND_GROWTH * track.most_points:
+        canvas.paint_close(track, on)
+        track.shape.add(own[on])
 
 
 def _near_shape(
