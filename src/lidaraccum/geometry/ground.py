@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from lidaraccum.geometry.grid import interpolated
 from lidaraccum.geometry.rigid import Pose, transform
 
 REACH_M = 64.0
@@ -56,21 +57,9 @@ class Ground:
 
     def height_above(self, level_points: NDArray[Any]) -> NDArray[np.float64]:
         """Height (N,) above the ground of points (N, 3), metres, in level coordinates."""
-        row, down = _split(level_points[:, 0])
-        column, right = _split(level_points[:, 1])
-        flat = row * _CELLS + column
-        table = self.heights.ravel()
-        near = table[flat] * (1 - right) + table[flat + 1] * right
-        flat += _CELLS
-        far = table[flat] * (1 - right) + table[flat + 1] * right
-        return level_points[:, 2] - (near * (1 - down) + far * down)
-
-
-def _split(along: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[Any]]:
-    """Cells whose centres come before places (N,) on an axis, and the way on to the next, 0..1."""
-    cells = np.clip((along + REACH_M) / CELL_M - 0.5, 0.0, _CELLS - 1.001)
-    low = cells.astype(np.int64)
-    return low, cells - low
+        x, y = level_points[:, :2].T
+        ground = interpolated(self.heights, x, y, reach_m=REACH_M, cell_m=CELL_M)
+        return level_points[:, 2] - ground
 
 
 def estimate_ground(points: NDArray[Any]) -> Ground:

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from lidaraccum.geometry.grid import interpolated
+
 CELL_M = 1.0
 REACH_M = 80.0
 OPENING_CELLS = 7
@@ -43,30 +45,9 @@ class Terrain:
 
     def height_above(self, points: NDArray[Any]) -> NDArray[np.float64]:
         """Height (N,) above the ground of points (N, 3), metres, in the frame's coordinates."""
-        x, y, z = points.T
-        row, down = _cell_and_rest(x)
-        column, across = _cell_and_rest(y)
-        corner = row * _CELLS + column
-        heights = self.heights.astype(np.float32).ravel()
-        near, far = (
-            (1 - across) * heights.take(first) + across * heights.take(first + 1)
-            for first in (corner, corner + _CELLS)
-        )
-        return z - ((1 - down) * near + down * far).astype(np.float64)
-
-
-def _cell_and_rest(
-    across: NDArray[Any],
-) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """The cell (N,) whose centre lies before places (N,), metres, and how far on they are, 0..1."""
-    cells = np.clip(
-        (across.astype(np.float32) + np.float32(REACH_M)) * np.float32(1 / CELL_M)
-        - np.float32(0.5),
-        0,
-        _CELLS - 1,
-    )
-    cell = np.minimum(cells.astype(np.int64), _CELLS - 2)
-    return cell, cells - cell.astype(np.float32)
+        x, y = np.ascontiguousarray(points[:, :2].T, dtype=np.float32)
+        heights = interpolated(self.heights, x, y, reach_m=REACH_M, cell_m=CELL_M)
+        return points[:, 2] - heights.astype(np.float64)
 
 
 def estimate_terrain(points: NDArray[Any]) -> Terrain:
