@@ -26,6 +26,8 @@ class AugmentSettings:
         jitter_m: One sigma of noise on every coordinate.
         rings: Chance that every other ring is missing.
         rays: Up to this share of the points is missing.
+        ground_m: One sigma of the error of the ground that points' heights are told above; see
+            `ground_error`.
         most_points: Frames with more are thinned to as many; 0 leaves them. Not an augmentation
             so much as a bound on what dense sensors cost.
     """
@@ -38,6 +40,7 @@ class AugmentSettings:
     jitter_m: float = 0.005
     rings: float = 0.15
     rays: float = 0.3
+    ground_m: float = 0.1
     most_points: int = 80_000
 
     def __post_init__(self) -> None:
@@ -46,7 +49,7 @@ class AugmentSettings:
                 raise SettingsError(f"{name} is a share of 0 to 1, not {getattr(self, name)}")
 
 
-NO_AUGMENTATION = AugmentSettings(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
+NO_AUGMENTATION = AugmentSettings(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
 """Windows as they are: for validation."""
 
 LabelledFrame = tuple[Frame, Labels]

@@ -12,6 +12,7 @@ from lidaraccum.errors import InputError, SettingsError
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.simulation.settings import DriveSettings
 from lidaraccum.training.augment import AugmentSettings, LabelledFrame, augment
+from lidaraccum.training.ground_error import misjudge_ground
 from lidaraccum.training.truth import make_window
 from lidaraccum.training.window import TrainingWindow
 
@@ -77,7 +78,8 @@ def cut_windows(
     for place in places:
         frames = augment([read[index] for index in place], settings.augment, rng)
         target = _draw_target(len(frames), rng)
-        windows.append(make_window(frames, target, network, settings.extent_m))
+        window = make_window(frames, target, network, settings.extent_m)
+        windows.append(misjudge_ground(window, settings.augment.ground_m, rng))
     return windows
 
 
