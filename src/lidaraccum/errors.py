@@ -42,3 +42,7 @@ class DoubtfulResultError(LidarAccumError, RuntimeError):
 
 class MissingDependencyError(LidarAccumError, ImportError):
     """An optional package that this call needs is not installed."""
+
+
+class ProcessLostError(LidarAccumError, ChildProcessError):
+    """A process that worked for this one ended before its work was done."""

@@ -68,3 +68,34 @@ def test_a_killed_run_leaves_nothing_under_the_final_names(
     assert not out.exists()
     assert not (tmp_path / "labels").exists()
     assert not list(tmp_path.glob("out.*"))
+
+
+def children_of(process: subprocess.Popen[str]) -> list[int]:
+    """The processes that a process has started."""
+    listed = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    return [int(number) for number in listed.read_text().split()]
+
+
+def is_running(process: int) -> bool:
+    """Whether a process is there and not merely waiting to be forgotten."""
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    return state != "Z"
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="asks Linux for processes")
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_no_process_outlives_the_one_that_started_it(
+    long_drive: Path, tmp_path: Path, number: signal.Signals
+) -> None:
+    process = start(long_drive, tmp_path / "out.ply", "--processes", 2)
+    children = children_of(process)
+    assert children
+    process.send_signal(number)
+    process.communicate(timeout=60)
+    deadline = time.monotonic() + 30
+    while any(map(is_running, children)) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not any(map(is_running, children))

@@ -1,61 +1,48 @@
-"""Reading ahead changes when frames are read, nothing else."""
+"""Working ahead changes when items are made, nothing else."""
 
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 
-import numpy as np
 import pytest
 
-from lidaraccum.data.frame import Frame
 from lidaraccum.errors import InputError
-from lidaraccum.pipeline.read_ahead import FRAMES_AHEAD, read_ahead
+from lidaraccum.pipeline.ahead import FRAMES_AHEAD, ahead
 
 
-@dataclass
-class Numbered:
-    """Frames that know their number; one of them may be broken."""
-
-    broken: int = -1
-    read: list[int] = field(default_factory=list)
-    name: str = "numbered"
-    rate_hz: float = 10.0
-    poses: None = None
-    crs_wkt: None = None
-
-    def __len__(self) -> int:
-        return 6
-
-    def __getitem__(self, index: int, /) -> Frame:
-        self.read.append(index)
-        if index == self.broken:
-            raise InputError(f"frame {index} is broken")
-        return Frame(np.full((3, 3), index, dtype=np.float32))
+def numbers(made: list[int], broken: int = -1) -> Iterator[int]:
+    """Six numbers, noted when they are made; one of them may not be makeable."""
+    for number in range(6):
+        made.append(number)
+        if number == broken:
+            raise InputError(f"number {number} is broken")
+        yield number
 
 
-def test_frames_come_in_order() -> None:
-    assert [frame.points[0, 0] for frame in read_ahead(Numbered())] == list(range(6))
+def test_items_come_in_order() -> None:
+    assert list(ahead(numbers([]))) == list(range(6))
+    assert list(ahead(iter(()))) == []
 
 
-def test_no_more_than_a_few_are_read_ahead() -> None:
-    sequence = Numbered()
-    frames = read_ahead(sequence)
-    next(frames)
-    assert max(sequence.read) <= FRAMES_AHEAD
-    frames.close()
+def test_no_more_than_a_few_are_made_ahead() -> None:
+    made: list[int] = []
+    items = ahead(numbers(made))
+    next(items)
+    items.close()
+    assert max(made) <= FRAMES_AHEAD
 
 
-def test_an_error_comes_when_its_frame_is_due() -> None:
-    frames = read_ahead(Numbered(broken=2))
-    assert [next(frames).points[0, 0] for _ in range(2)] == [0, 1]
-    with pytest.raises(InputError, match="frame 2"):
-        next(frames)
+def test_an_error_comes_when_its_item_is_due() -> None:
+    items = ahead(numbers([], broken=2))
+    assert [next(items) for _ in range(2)] == [0, 1]
+    with pytest.raises(InputError, match="number 2"):
+        next(items)
 
 
 def test_no_thread_is_left_behind() -> None:
     before = threading.active_count()
-    frames = read_ahead(Numbered())
-    next(frames)
-    frames.close()
+    items = ahead(ahead(numbers([])))
+    next(items)
+    items.close()
     assert threading.active_count() == before

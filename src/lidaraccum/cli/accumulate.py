@@ -11,7 +11,13 @@ import click
 from lidaraccum.cli import options
 from lidaraccum.cli.door import Command
 from lidaraccum.cli.progress import watch
-from lidaraccum.cli.settings import accumulate_settings, open_source, reported, with_method
+from lidaraccum.cli.settings import (
+    accumulate_settings,
+    chosen_processes,
+    open_source,
+    reported,
+    with_method,
+)
 from lidaraccum.errors import DoubtfulResultError
 
 if TYPE_CHECKING:
@@ -47,6 +53,7 @@ if TYPE_CHECKING:
 @options.registration_options
 @options.result_options
 @options.output_options
+@options.processes_option
 @options.talk_options
 def accumulate(**params: Any) -> None:
     """Put a drive's frames into one clean, dense, labelled cloud.
@@ -75,7 +82,8 @@ def accumulate(**params: Any) -> None:
         _tell_found(sequence)
     quiet = params["quiet"] or params["no_progress"]
     shown = watch(len(sequence), quiet=quiet)
-    report = accumulate_to_files(sequence, settings, output, watch=shown)
+    processes = chosen_processes(params, len(sequence))
+    report = accumulate_to_files(sequence, settings, output, watch=shown, processes=processes)
     _tell_result(report, output, as_json=params["as_json"], quiet=params["quiet"])
     if params["strict"] and report.doubtful:
         raise DoubtfulResultError(

@@ -10,7 +10,7 @@ import click
 
 from lidaraccum.cli import options
 from lidaraccum.cli.door import Command
-from lidaraccum.cli.settings import open_source
+from lidaraccum.cli.settings import chosen_processes, open_source
 
 
 @click.command(cls=Command)
@@ -19,6 +19,7 @@ from lidaraccum.cli.settings import open_source
 @click.option("--window", type=click.IntRange(min=2), default=5, help="Frames a window.")
 @click.option("--method", default="ego-only", metavar="NAME", help="What finds movers.")
 @options.weights_option
+@options.processes_option
 @options.input_options
 @options.registration_options
 @options.talk_options
@@ -35,14 +36,16 @@ def benchmark(**params: Any) -> None:
     from lidaraccum.registration.settings import RegistrationSettings
 
     registration = RegistrationSettings(deskew=params["deskew"], poses_mode=params["poses_mode"])
+    sequence = open_source(params)
     settings = BenchmarkSettings(
         accumulate=AccumulateSettings(
             method=params["method"], weights=params["weights"], registration=registration
         ),
         repeat=params["repeat"],
         window=params["window"],
+        processes=chosen_processes(params, len(sequence)),
     )
-    report = measure(open_source(params), settings)
+    report = measure(sequence, settings)
     if params["as_json"]:
         content = asdict(report)
         for rival in content["rivals"]:

@@ -138,6 +138,14 @@ registration_options = _stack(
     ),
 )
 
+processes_option = click.option(
+    "--processes",
+    type=click.IntRange(1, 2),
+    metavar="1|2",
+    show_default="2 where there are cores and frames enough",
+    help="With 2, frames find their place in a process of its own.",
+)
+
 weights_option = click.option(
     "--weights",
     type=click.Path(path_type=Path),

@@ -12,7 +12,10 @@ if TYPE_CHECKING:
     from lidaraccum.pipeline.accumulator import AccumulateSettings
 
 # Options that decide neither what is read nor what comes out.
-TALK = {"config", "as_json", "no_progress", "quiet", "verbose", "traceback", "dry_run", "overwrite"}
+TALK = {
+    "config", "as_json", "no_progress", "quiet", "verbose", "traceback", "dry_run", "overwrite",
+    "processes",
+}  # fmt: skip
 
 
 def open_source(params: Mapping[str, Any]) -> FileSequence:
@@ -72,6 +75,14 @@ def accumulate_settings(params: Mapping[str, Any]) -> AccumulateSettings:
             drop_dynamic=params["drop_dynamic"],
         ),
     )
+
+
+def chosen_processes(params: Mapping[str, Any], frames: int) -> int:
+    """As many processes as asked for, or as pay for so many frames."""
+    from lidaraccum.registration.apart import is_worthwhile
+
+    asked: int | None = params["processes"]
+    return asked or (2 if is_worthwhile(frames) else 1)
 
 
 def reported(params: Mapping[str, Any]) -> dict[str, Any]:

@@ -36,12 +36,14 @@ class BenchmarkSettings:
         repeat: Times everything is run; medians are told.
         window: Frames a window.
         rivals: What else is timed.
+        processes: Of a streamed run; a window by itself always has one.
     """
 
     accumulate: AccumulateSettings = field(default_factory=AccumulateSettings)
     repeat: int = 3
     window: int = 5
     rivals: tuple[Rival, ...] = RIVALS
+    processes: int = 1
 
     def __post_init__(self) -> None:
         if self.repeat < 1 or self.window < 2:
@@ -138,10 +140,10 @@ def _time_all(sequence: Sequence, frames: Items[Frame], settings: BenchmarkSetti
         for first in range(0, len(frames) - settings.window + 1, settings.window)
     ]
     held, timed = Held(sequence, frames), _Timed()
-    _run(windows[0], settings)
+    _run(windows[0], settings.accumulate)
     for _ in range(settings.repeat):
-        timed.streamed.append(_run(held, settings))
-        spent = sum(sum(_run(one, settings).values()) for one in windows)
+        timed.streamed.append(_run(held, settings.accumulate, settings.processes))
+        spent = sum(sum(_run(one, settings.accumulate).values()) for one in windows)
         timed.window_seconds.append(spent / len(windows))
         if len(timed.streamed) == 1:
             timed.peak_mb = _peak_mb()
@@ -150,9 +152,9 @@ def _time_all(sequence: Sequence, frames: Items[Frame], settings: BenchmarkSetti
     return timed
 
 
-def _run(sequence: Sequence, settings: BenchmarkSettings) -> dict[str, float]:
+def _run(sequence: Sequence, settings: AccumulateSettings, processes: int = 1) -> dict[str, float]:
     """Seconds by stage of one run over one sequence."""
-    accumulator = Accumulator(sequence, settings.accumulate)
+    accumulator = Accumulator(sequence, settings, processes=processes)
     for frame in accumulator.frames():
         accumulator.select(frame)
     seconds = accumulator.clock.seconds
@@ -170,6 +172,7 @@ def _time_rival(rival: Rival, frames: Items[Frame], timed: _Timed) -> None:
 
 
 def _peak_mb() -> float:
-    """Largest resident memory of this process so far, 10^6 bytes."""
+    """Largest resident memory so far, of this process and of the largest it had, 10^6 bytes."""
     unit = 1 if sys.platform == "darwin" else 1024
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
+    sizes = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    return sum(resource.getrusage(size).ru_maxrss for size in sizes) * unit / 1e6

@@ -44,8 +44,8 @@ class BenchmarkReport:
         stages: Of the streamed run.
         seconds_per_frame: Streamed: all frames as one sequence.
         seconds_per_window: Each window as a sequence of its own, the first motion found anew.
-        peak_mb: Largest resident memory of the process before any rival was opened, frames held in
-            memory and libraries included.
+        peak_mb: Largest resident memory before any rival was opened, of the process, frames held in
+            memory and libraries included, and of the one that registers.
         rivals: On the same frames, in the same runs, turn by turn.
     """
 

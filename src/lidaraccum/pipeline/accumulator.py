@@ -17,6 +17,7 @@ from lidaraccum.data.sequence import LabelledSequence, Sequence
 from lidaraccum.errors import InputError, SettingsError
 from lidaraccum.geometry import rigid
 from lidaraccum.model.weights import available_weights, chosen_weights
+from lidaraccum.pipeline.ahead import ahead
 from lidaraccum.pipeline.clock import StageClock
 from lidaraccum.pipeline.label_free import LabelFree
 from lidaraccum.pipeline.motion_settings import PRESETS
@@ -24,12 +25,12 @@ from lidaraccum.pipeline.mover_deskew import undo_own_motion
 from lidaraccum.pipeline.network_led import NetworkLed
 from lidaraccum.pipeline.perception import AllStatic, GivenLabels, Perceiver
 from lidaraccum.pipeline.placing import Reference
-from lidaraccum.pipeline.read_ahead import read_ahead
 from lidaraccum.pipeline.report import FrameTally
 from lidaraccum.pipeline.selection import Selection, SelectionSettings
 from lidaraccum.pipeline.spool import after_the_last
 from lidaraccum.pipeline.tracks import TrackBook
 from lidaraccum.pipeline.tubes import Reader
+from lidaraccum.registration.apart import Registrar
 from lidaraccum.registration.odometry import register
 from lidaraccum.registration.settings import RegistrationSettings
 
@@ -107,6 +108,7 @@ class Accumulator:
         *,
         perceiver: Perceiver | None = None,
         registered: Iterable[RegisteredFrame] | None = None,
+        processes: int = 1,
     ) -> None:
         """Prepare a run.
 
@@ -116,12 +118,18 @@ class Accumulator:
             perceiver: What finds the movers, where it is not the one that the settings name.
             registered: The sequence's frames, registered before; otherwise they are read and
                 registered here.
+            processes: With 2, frames are registered in a process of its own while movers are
+                looked for in those before them; the program's own module must then be one that
+                can be imported twice (`multiprocessing`'s way to start a process).
         """
         if len(sequence) < 2:
             raise InputError(f"{sequence.name} has {len(sequence)} frame; it takes at least 2")
         self._sequence = sequence
         self._settings = settings
         self._reference_index = reference_index(settings.reference, sequence)
+        self._registrar: Registrar | None = None
+        if processes > 1 and registered is None:
+            self._registrar = Registrar(settings.registration, sequence.poses)
         self._perceiver = perceiver or choose_perceiver(settings, sequence)
         self.weights = self._perceiver.weights if isinstance(self._perceiver, NetworkLed) else None
         self._registered = registered
@@ -134,10 +142,16 @@ class Accumulator:
 
     def frames(self) -> Iterator[AccumulatedFrame]:
         """Each frame in the reference frame, in order, all its points; `select` thins them."""
-        frames = self.clock.timed("read", self._read())
+        try:
+            yield from self._frames()
+        finally:
+            if self._registrar is not None:
+                self._registrar.close()
+
+    def _frames(self) -> Iterator[AccumulatedFrame]:
         registered = self._registered
         if registered is None:
-            registered = self.clock.timed("register", self._register(frames))
+            registered = self.clock.timed("register", self._register())
         perceived = self.clock.timed("perceive", self._perceiver.perceive(registered))
         noted = self._note(self.clock.timed("undo own motion", self._undo(perceived)))
         if self._reference_index > 0:
@@ -155,13 +169,18 @@ class Accumulator:
         """What was found to be an object, once all frames are through."""
         return self._book.tracks(self._found_reference().reference_from_world)
 
+    def _register(self) -> Iterator[RegisteredFrame]:
+        """Frames registered; in a process of its own reading them is no stage that we wait for."""
+        if self._registrar is not None:
+            return ahead(self._registrar.register(ahead(self._read())))
+        frames = self.clock.timed("read", ahead(self._read()))
+        return register(frames, self._settings.registration, self._sequence.poses)
+
     def _read(self) -> Iterator[Frame]:
-        for frame in read_ahead(self._sequence):
+        for index in range(len(self._sequence)):
+            frame = self._sequence[index]
             self.tally.count_frame(frame)
             yield frame
-
-    def _register(self, frames: Iterable[Frame]) -> Iterator[RegisteredFrame]:
-        return register(frames, self._settings.registration, self._sequence.poses)
 
     def _undo(self, frames: Iterable[PerceivedFrame]) -> Iterator[PerceivedFrame]:
         return undo_own_motion(frames, PRESETS[self._settings.preset].max_speed_mps)

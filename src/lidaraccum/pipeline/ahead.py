@@ -1,27 +1,35 @@
-"""Frames are read while the ones before them are worked on."""
+"""Items are made while the ones before them are worked on."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
 
-from lidaraccum.data.frame import Frame
-from lidaraccum.data.sequence import Sequence
+Item = TypeVar("Item")
 
 FRAMES_AHEAD = 2
 
 
-def read_ahead(sequence: Sequence) -> Iterator[Frame]:
-    """Each frame in order, read in a thread of its own up to two frames ahead.
+def ahead(items: Iterable[Item]) -> Iterator[Item]:
+    """Each item in order, made in a thread of its own up to two items ahead.
 
-    What reading a frame raises is raised when it is that frame's turn.
+    What making an item raises is raised when it is that item's turn.
     """
-    waiting: deque[Future[Frame]] = deque()
-    with ThreadPoolExecutor(max_workers=1) as reader:
-        for index in range(len(sequence)):
-            waiting.append(reader.submit(sequence.__getitem__, index))
-            if len(waiting) > FRAMES_AHEAD:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
+    source = iter(items)
+    waiting: deque[Future[list[Item]]] = deque()
+    with ThreadPoolExecutor(max_workers=1) as maker:
+        waiting.extend(maker.submit(_next, source) for _ in range(FRAMES_AHEAD))
+        try:
+            while made := waiting.popleft().result():
+                waiting.append(maker.submit(_next, source))
+                yield made[0]
+        finally:
+            for one in waiting:
+                one.cancel()
+
+
+def _next(source: Iterator[Item]) -> list[Item]:
+    """The next item alone; none when there is no more, for a future holds no StopIteration."""
+    return [item for _, item in zip(range(1), source, strict=False)]

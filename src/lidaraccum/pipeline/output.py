@@ -154,6 +154,7 @@ def accumulate_to_files(
     settings: AccumulateSettings,
     output: OutputSettings,
     watch: Watch = iter,
+    processes: int = 1,
 ) -> AccumulationReport:
     """Put a sequence into one cloud on disk, points going out as frames come in.
 
@@ -162,6 +163,7 @@ def accumulate_to_files(
         settings: How the cloud comes about.
         output: What to write.
         watch: Sees each frame go by, for a progress bar.
+        processes: 1 or 2, as `Accumulator` takes them.
 
     Raises:
         LidarAccumError: Nothing is left under a final name then.
@@ -169,7 +171,7 @@ def accumulate_to_files(
     check_outputs(output)
     check_inputs_stay(sequence, output)
     sequence.require_frames(2)
-    accumulator = Accumulator(sequence, settings)
+    accumulator = Accumulator(sequence, settings, processes=processes)
     cloud_settings = WriterSettings(
         overwrite=output.overwrite,
         crs_wkt=sequence.crs_wkt,
