@@ -15,6 +15,7 @@ from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.object_ids import ObjectIds
 from lidaraccum.pipeline.painting import Canvas
+from lidaraccum.pipeline.places import Places
 from lidaraccum.pipeline.still_objects import StillObjects
 from lidaraccum.pipeline.suspects import Lead
 from lidaraccum.pipeline.tubes import CELL_M, NEIGHBOURS, RADIUS_M, Reader, Tube, find_tubes
@@ -47,6 +48,7 @@ class NetworkAdvice:
         self._worker = worker
         self._settings = settings
         self._still = StillObjects(ids)
+        self._places = Places()
         self._encoded: dict[int, Future[Any]] = {}
         self._readings: dict[int, FrameReading] = {}
         self._tubes: list[Tube] = []
@@ -64,7 +66,7 @@ class NetworkAdvice:
             poses = np.stack([frame.world_from_sensor for frame in run])
             reading = self._reader.look(encoded, poses, 0)
             for frame, one in zip(run, reading.frames, strict=True):
-                self._readings[frame.index] = one
+                self._note(frame, one)
             self._tubes += find_tubes(run, reading, self._reader, self._settings)
         self._next_unread = window[-1].index + 1
         recent = {frame.index for frame in window[-SPAN:]}
@@ -79,17 +81,17 @@ class NetworkAdvice:
         reading = self._readings.pop(frame.index, None)
         if reading is None:
             return
-        rows = np.concatenate([frame.rows, frame.low_rows])
-        level = frame.world_of_near()[:, :2]
+        rows, level = _standing(frame)
         self._follow_movers(rows, level, canvas)
-        free = (reading.foreground[rows] > MOVABLE_ABOVE) & (canvas.instances(rows) == 0)
-        rows, level = rows[free], level[free]
+        movable = self._places.probability(level)
+        free = (movable > MOVABLE_ABOVE) & (canvas.instances(rows) == 0)
+        rows, level, movable = rows[free], level[free], movable[free]
         cluster = dense_groups(level + reading.offset[rows], CELL_M, RADIUS_M, NEIGHBOURS)
         counts = np.bincount(cluster[cluster >= 0], minlength=1)
         groups = [np.flatnonzero(cluster == one) for one in np.flatnonzero(counts >= STILL_POINTS)]
         names = self._still.name([level[group] for group in groups])
         for name, group in zip(names, groups, strict=True):
-            canvas.paint_still(rows[group], name, reading.foreground[rows[group]])
+            canvas.paint_still(rows[group], name, movable[group])
 
     def _unread_runs(self, window: Sequence[SightedFrame]) -> Iterator[list[SightedFrame]]:
         """Runs of frames that cover all that was not looked at, each from the one before on."""
@@ -101,6 +103,13 @@ class NetworkAdvice:
             yield list(window[first : first + SPAN])
             unread = first + SPAN
 
+    def _note(self, frame: SightedFrame, reading: FrameReading) -> None:
+        """Keep what was read of a frame; a frame looked at again speaks for a place once more."""
+        self._readings[frame.index] = reading
+        rows, level = _standing(frame)
+        ranges = frame.registered.frame.ranges[rows]
+        self._places.note(level, reading.foreground[rows], ranges)
+
     def _follow_movers(
         self, rows: NDArray[np.int64], level: NDArray[np.float64], canvas: Canvas
     ) -> None:
@@ -109,3 +118,9 @@ class NetworkAdvice:
         instances, level = instances[moving], level[moving]
         for instance in np.unique(instances).tolist():
             self._still.follow(instance, level[instances == instance])
+
+
+def _standing(frame: SightedFrame) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Rows (K,) of what stands on the ground, near enough to be looked at, and places (K, 2)."""
+    rows = np.concatenate([frame.rows, frame.low_rows])
+    return rows, frame.world_of_near()[:, :2]

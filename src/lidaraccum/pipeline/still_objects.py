@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.pipeline.object_ids import ObjectIds
-
-CELL_M = 0.5
-"""Places are told apart by cells so wide, seen from above."""
+from lidaraccum.pipeline.places import cell_keys, cells_of
 
 LEAST_SHARE = 0.1
 """A cluster is the object that has most of its cells, if that is at least this share of them."""
@@ -21,8 +19,6 @@ MOST_CELLS = 400
 """So many objects are remembered, the latest seen, with so many cells each: some 100 MB."""
 
 Cell = tuple[int, int]
-
-_WIDTH = 1 << 31
 
 
 class StillObjects:
@@ -87,7 +83,5 @@ class StillObjects:
 
 
 def _cells(points: NDArray[np.float64]) -> set[Cell]:
-    x, y = np.floor(points.T * (1.0 / CELL_M)).astype(np.int64)
-    unique = np.unique(x * _WIDTH + y)  # as one number, for NumPy is slow at pairs
-    x = (unique + _WIDTH // 2) // _WIDTH
-    return set(zip(x.tolist(), (unique - x * _WIDTH).tolist(), strict=True))
+    x, y = cells_of(np.unique(cell_keys(points)))
+    return set(zip(x.tolist(), y.tolist(), strict=True))
