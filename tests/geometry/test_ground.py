@@ -80,6 +80,35 @@ def test_the_mirror_image_of_a_vehicle_in_the_road_digs_no_hole() -> None:
     assert off.max() < STRAY_M
 
 
+def test_thin_mirror_images_dig_no_hole() -> None:
+    """A few points a cell, as a car beyond a wet road leaves, over many cells that hold no road."""
+    rng = np.random.default_rng(0)
+    mount_m = 1.8
+    road, _ = street()
+    road[:, 2] -= mount_m
+    hidden = (road[:, 0] > 8) & (road[:, 1] < -2) & (road[:, 1] > -9)
+    images = rng.uniform([8, -9, -4 - mount_m], [18, -2, -0.2 - mount_m], (80, 3))
+    images = images[images[:, 0] * mount_m / -images[:, 2] < 8]  # off the road that is in sight
+    ground = estimate_ground(np.concatenate([road[~hidden], images]))
+    above = ground.height_above(rigid.transform(ground.level_from_sensor, road))
+    assert np.abs(above[on_road(road)]).max() < 0.3
+
+
+def test_cars_in_a_row_that_hide_the_ground_do_not_raise_it() -> None:
+    """Of the second row only upper parts are seen, and nothing of what it stands on."""
+    rng = np.random.default_rng(0)
+    xy = rng.uniform(-40, 40, (40_000, 2))
+    behind = (xy[:, 1] > 4) & (xy[:, 1] < 9) & (np.abs(xy[:, 0]) < 20)
+    lot = np.column_stack([xy[~behind], np.zeros(np.count_nonzero(~behind))])
+    first = rng.uniform([-20, 4, 0.2], [20, 5.8, 1.5], (4000, 3))
+    second = rng.uniform([-20, 7, 0.7], [20, 8.8, 1.5], (1000, 3))
+    ground = estimate_ground(np.concatenate([lot, first, second]) - [0, 0, 1.8])
+    under = np.column_stack([xy[behind], np.full(np.count_nonzero(behind), -1.8)])
+    above = ground.height_above(rigid.transform(ground.level_from_sensor, under))
+    assert np.abs(above).max() < 0.3
+    assert np.percentile(np.abs(above), 75) < 0.15
+
+
 def test_a_slope_that_begins_beyond_a_crest_is_ground() -> None:
     """Far below the plane, but no ray to it passes through the road."""
     rng = np.random.default_rng(0)

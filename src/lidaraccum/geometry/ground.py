@@ -25,14 +25,21 @@ PLANE_REACH_M = 25.0
 PLANE_INLIER_M = 0.15
 STEEPEST_MOUNT = 0.5
 """Planes steeper than this (rise over run) are walls, whatever they score."""
-SLOPE = 0.2
-"""Ground rises and falls by at most this against the plane (rise over run)."""
+OPENING_CELLS = 5
+"""What is narrower than this stands on the ground; wider things are hills."""
+STEP_M = 0.2
+"""A cell that begins so far above the ground around it holds none: a car's sill, say."""
+SLOPE = 0.15
+"""Ground rises by at most this over ground beside it (rise over run)."""
 STRAY_M = 0.7
 """A cell this far below nearly all that is around it holds a stray echo, not ground."""
 STRAY_CELLS = 4
 """As many cells side by side may hold strays: a mirror image of something in a wet road, say."""
 FLAT_M = 0.3
-"""A cell whose lowest point is this near the plane holds the road that no ray passes."""
+"""Points this near the plane are of the road that no ray passes."""
+ROAD_POINTS, DITCH_POINTS = 3, 8
+"""A cell with so many of them holds the road; with so many deeper ones, and no road, a ditch.
+Fewer deeper ones than the first number are strays."""
 LEAST_MOUNT_M = 0.5
 """Where the sensor seems lower than this above the road, its coordinates start elsewhere."""
 
@@ -71,39 +78,48 @@ def estimate_ground(points: NDArray[Any]) -> Ground:
     plane = _fit_plane(_without_strays(_lowest(points)))
     level_from_sensor = _levelling(plane)
     level = transform(level_from_sensor, points)
-    deep = level[:, 2] < -STRAY_M
+    deep = level[:, 2] < -FLAT_M
     low = _lowest(level, ~deep)
     if deep.any():
         below = level[deep]
-        below = below[~_under_the_road(below, low, float(level_from_sensor[2, 3]))]
-        low = np.fmin(low, _lowest(below))
+        flat = level[np.abs(level[:, 2]) < FLAT_M]
+        ground = _look_up(_counts(below) >= ROAD_POINTS, below)
+        ground &= ~_under_the_road(below, flat, float(level_from_sensor[2, 3]))
+        low = np.fmin(low, _lowest(below[ground]))
     return Ground(level_from_sensor, _follow(_without_strays(low)))
 
 
 def _under_the_road(
-    deep: NDArray[np.float64], low: NDArray[np.float64], mount_m: float
+    deep: NDArray[np.float64], flat: NDArray[np.float64], mount_m: float
 ) -> NDArray[np.bool_]:
     """Deep points (N, 3) that only a ray through the road could have met: mirror images, say.
 
-    The road (all else's lowest points, (G, G)) must have been seen where the ray crosses its plane,
-    and half way from there to the point nothing lower; a ditch or a slope beyond the road's edge is
-    not under the road.
+    The road (points near its plane, (M, 3)) must have been seen where the ray crosses the plane. A
+    ditch or a slope beyond the road's edge is not under it: half way from there to the point lies
+    nothing of the road, but much that is as deep.
     """
     if mount_m < LEAST_MOUNT_M:
         return np.zeros(len(deep), dtype=bool)
-    low = _without_strays(low)
+    road = _counts(flat) >= ROAD_POINTS
+    ditch = (_counts(deep) >= DITCH_POINTS) & ~road
     crossing = mount_m / (mount_m - deep[:, 2])
-    at_crossing = _look_up(low, deep[:, :2] * crossing[:, None])
-    half_way = _look_up(low, deep[:, :2] * (0.5 + 0.5 * crossing)[:, None])
-    return (np.abs(at_crossing) < FLAT_M) & ~(half_way < -FLAT_M)
+    at_crossing = _look_up(road, deep[:, :2] * crossing[:, None])
+    half_way = _look_up(ditch, deep[:, :2] * (0.5 + 0.5 * crossing)[:, None])
+    return at_crossing & ~half_way
 
 
-def _look_up(low: NDArray[np.float64], xy: NDArray[Any]) -> NDArray[np.float64]:
-    """What a map (G, G) says at places (N, 2), metres; NaN beyond its edge."""
+def _look_up(cells: NDArray[np.bool_], xy: NDArray[Any]) -> NDArray[np.bool_]:
+    """What a map (G, G) says at places (N, 2), metres; False beyond its edge."""
     inside, key = _keys(xy)
-    found = np.full(len(xy), np.nan)
-    found[inside] = low.ravel()[key]
+    found = np.zeros(len(xy), dtype=bool)
+    found[inside] = cells.ravel()[key]
     return found
+
+
+def _counts(points: NDArray[Any]) -> NDArray[np.int64]:
+    """Points (N, 3) in each cell, (G, G)."""
+    _, key = _keys(points)
+    return np.bincount(key, minlength=_CELLS * _CELLS).reshape(_CELLS, _CELLS)
 
 
 def _keys(xy: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -188,22 +204,22 @@ def _levelling(plane: NDArray[np.float64]) -> Pose:
 
 
 def _follow(low: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Ground (G, G) under the lowest points (G, G): as high as slope allows below them.
+    """Ground (G, G) under the lowest points (G, G): opened, bridged, no steeper than slope allows.
 
-    Buildings and bushes that hide the ground stick out of it; cells without points are bridged.
+    Cars, buildings and bushes that hide the ground stick out of it and fall away; their cells, and
+    those without points, take the nearest ground's height.
     """
-    reach = np.arange(-_CONE_CELLS, _CONE_CELLS + 1) * CELL_M
-    cone = SLOPE * np.hypot(*np.meshgrid(reach, reach, indexing="ij"))
     known = ~np.isnan(low)
     if not known.any():
         return np.zeros((_CELLS, _CELLS))
-    ground = np.where(known, low, 1e3)
-    for _ in range(2):
-        ground = ndimage.grey_erosion(ground, structure=-cone, mode="nearest")
-    bridged = ground < 100.0
-    if not bridged.all():
-        nearest = ndimage.distance_transform_edt(
-            ~bridged, return_distances=False, return_indices=True
-        )
-        ground = ground[tuple(nearest)]
+    eroded = ndimage.minimum_filter(np.where(known, low, np.inf), size=OPENING_CELLS)
+    opened = ndimage.maximum_filter(
+        np.where(np.isfinite(eroded), eroded, -np.inf), size=OPENING_CELLS
+    )
+    stands = ~known
+    stands[known] = low[known] - opened[known] >= STEP_M
+    nearest = ndimage.distance_transform_edt(stands, return_distances=False, return_indices=True)
+    reach = np.arange(-_CONE_CELLS, _CONE_CELLS + 1) * CELL_M
+    cone = SLOPE * np.hypot(*np.meshgrid(reach, reach, indexing="ij"))
+    ground = ndimage.grey_erosion(low[tuple(nearest)], structure=-cone, mode="nearest")
     return ndimage.uniform_filter(ground, size=3, mode="nearest")
