@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from lidaraccum.geometry.grid import interpolated
+from lidaraccum.geometry.ground import estimate_ground
+from lidaraccum.geometry.rigid import transform
 
 CELL_M = 1.0
 REACH_M = 80.0
-OPENING_CELLS = 7
-"""Things narrower than this stand on the ground; wider ones are hills, or roofs seen from above."""
 
-MAX_STEP_M = 0.6
-"""A cell this far above the lowest ground around it holds no ground."""
+HIGHEST_M, LOWEST_M = 0.3, -0.5
+"""A cell that begins so far above the rough ground holds none, nor one so far below it."""
 
 ROAD_REACH_M = 10.0
 ROAD_STEP_M = 0.3
@@ -53,20 +53,16 @@ class Terrain:
 def estimate_terrain(points: NDArray[Any]) -> Terrain:
     """Ground under the points (N, 3) of one frame, metres, z up, about the sensor.
 
-    Lowest points of cells, opened so that what stands on the ground falls away; cells without
-    ground take the nearest cell's. Stray echoes from below are passed over where a cell has
-    points enough.
+    Lowest points of cells that lie near the rough ground (`ground`); cells without ground take the
+    nearest cell's. Stray echoes from below are passed over where a cell has points enough.
     """
     low = _low_points(points)
     known = np.isfinite(low)
     if not known.any():
         return Terrain(np.zeros((_CELLS, _CELLS)))
-    eroded = ndimage.minimum_filter(np.where(known, low, np.inf), size=OPENING_CELLS)
-    opened = ndimage.maximum_filter(
-        np.where(np.isfinite(eroded), eroded, -np.inf), size=OPENING_CELLS
-    )
+    above = _above_rough_ground(low, points)
     with np.errstate(invalid="ignore"):
-        ground = known & (low - opened < MAX_STEP_M)
+        ground = known & (above < HIGHEST_M) & (above > LOWEST_M)
         ground &= ~(low - _road(low) > ROAD_STEP_M)
     if not ground.any():
         return Terrain(np.zeros((_CELLS, _CELLS)))
@@ -74,13 +70,27 @@ def estimate_terrain(points: NDArray[Any]) -> Terrain:
     return Terrain(ndimage.median_filter(low[tuple(nearest)], size=3))
 
 
+def _above_rough_ground(low: NDArray[np.float64], points: NDArray[Any]) -> NDArray[np.float64]:
+    """How far above the ground, as `ground` has it, cells begin (G, G), metres."""
+    rough = estimate_ground(points)
+    x, y = _middles()
+    cells = np.column_stack([x.ravel(), y.ravel(), np.where(np.isfinite(low), low, 0.0).ravel()])
+    return rough.height_above(transform(rough.level_from_sensor, cells)).reshape(low.shape)
+
+
+def _middles() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where cells have their middles: x and y (G, G), metres."""
+    middle = (np.arange(_CELLS) + 0.5) * CELL_M - REACH_M
+    x, y = np.meshgrid(middle, middle, indexing="ij")
+    return x, y
+
+
 def _road(low: NDArray[np.float64]) -> NDArray[np.float64]:
     """Height (G, G) of the plane under the lowest of the cells near the sensor; NaN farther out.
 
     What lies off the plane counts less and less. NaN too where few cells are known.
     """
-    middle = (np.arange(_CELLS) + 0.5) * CELL_M - REACH_M
-    x, y = np.meshgrid(middle, middle, indexing="ij")
+    x, y = _middles()
     plane = np.full(low.shape, np.nan)
     near = np.hypot(x, y) < ROAD_REACH_M
     used = near & np.isfinite(low)
