@@ -45,16 +45,16 @@ def test_groups_are_the_equal_keys() -> None:
 
 
 def test_moments_give_mean_and_covariance() -> None:
-    mean, covariance = planes.mean_and_covariance(planes.summed_moments(POINTS, np.array([0])))
-    np.testing.assert_allclose(mean[0], POINTS.mean(axis=0))
+    mean, covariance = planes.mean_and_covariance(planes.summed_moments(POINTS.T, np.array([0])))
+    np.testing.assert_allclose(mean[:, 0], POINTS.mean(axis=0))
     truth = np.cov(POINTS.T, bias=True)[np.triu_indices(3)]
-    np.testing.assert_allclose(covariance[0], truth, atol=1e-9)
+    np.testing.assert_allclose(covariance[:, 0], truth, atol=1e-9)
 
 
 def test_shifted_moments_are_those_of_shifted_points() -> None:
-    shift = np.array([[1.0, -2.0, 3.0]])
-    moved = planes.shift_moments(planes.summed_moments(POINTS, np.array([0])), shift)
-    again = planes.summed_moments(POINTS + shift, np.array([0]))
+    shift = np.array([[1.0], [-2.0], [3.0]])
+    moved = planes.shift_moments(planes.summed_moments(POINTS.T, np.array([0])), shift)
+    again = planes.summed_moments(POINTS.T + shift, np.array([0]))
     np.testing.assert_allclose(moved, again, rtol=1e-9)
 
 

@@ -42,10 +42,7 @@ def voxel_centres(keys: Keys, size_m: float) -> NDArray[np.float64]:
 def group_by_key(keys: Keys) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """An order (N,) that sorts keys (N,), and where each group of equal keys starts in it (V,)."""
     order = np.argsort(keys)
-    ordered = keys[order]
-    is_first = np.ones(len(keys), dtype=np.bool_)
-    is_first[1:] = ordered[1:] != ordered[:-1]
-    return order, np.flatnonzero(is_first)
+    return order, _changes(keys.take(order))
 
 
 def thin(points: NDArray[Any], size_m: float) -> NDArray[np.int64]:
@@ -55,14 +52,20 @@ def thin(points: NDArray[Any], size_m: float) -> NDArray[np.int64]:
     """
     if len(points) == 0:
         return np.zeros(0, dtype=np.int64)
-    keys = voxel_keys(points, size_m)
-    scaled = points * (1.0 / size_m)
-    away = ((scaled - np.floor(scaled) - 0.5) ** 2).sum(axis=1)
-    order, starts = group_by_key(keys)
-    away = away[order]
-    counts = np.diff(np.append(starts, len(keys)))
+    scaled = np.ascontiguousarray(points.T) * (1.0 / size_m)
+    cells = np.floor(scaled)
+    x, y, z = scaled - cells - 0.5
+    away = x * x + y * y + z * z
+    order, starts = group_by_key(cell_keys(cells.T.astype(np.int64)))
+    away = away.take(order)
+    counts = np.diff(starts, append=len(order))
     nearest = np.flatnonzero(away == np.repeat(np.minimum.reduceat(away, starts), counts))
     voxel_of_nearest = np.searchsorted(starts, nearest, side="right")
-    first_of_voxel = np.ones(len(nearest), dtype=np.bool_)
-    first_of_voxel[1:] = voxel_of_nearest[1:] != voxel_of_nearest[:-1]
-    return order[nearest[first_of_voxel]]
+    return order[nearest[_changes(voxel_of_nearest)]]
+
+
+def _changes(ordered: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Where each run of equal values begins, in values (N,) that come in runs."""
+    is_first = np.ones(len(ordered), dtype=np.bool_)
+    np.not_equal(ordered[1:], ordered[:-1], out=is_first[1:])
+    return np.flatnonzero(is_first)

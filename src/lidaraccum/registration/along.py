@@ -40,14 +40,14 @@ def open_axis(
     surface: SurfaceMap, points: NDArray[np.float64], pose: rigid.Pose
 ) -> NDArray[np.float64] | None:
     """The direction (3,), world, that no plane under points (M, 3) fixes; None where all are."""
-    matches = surface.match(rigid.transform(pose, points))
+    matches = surface.match(rigid.transform(pose, points).T)
     weights = matches.weights * (np.abs(matches.distances) < SCORE_GATE_M)
     total = float(weights.sum())
     if total <= 0:
         return None
-    spread = (matches.normals * weights[:, None]).T @ matches.normals / total
+    spread = (matches.normals * weights) @ matches.normals.T / total
     axis = np.linalg.eigh(spread)[1][:, 0]
-    lean = (matches.normals @ axis) ** 2
+    lean = (axis @ matches.normals) ** 2
     across = float((weights * lean)[lean > LEANING**2].sum())
     return np.asarray(axis) if across < OPEN_BELOW * total else None
 

@@ -89,21 +89,19 @@ class AzimuthTime:
         points = _thinned(source.points, self._settings.source_voxel_m)
         start = rigid.invert(target.world_from_sensor) @ source.world_from_sensor
         pose = align(surface, points, start)
-        placed = rigid.transform(pose, points)
-        matches = surface.match(placed)
+        matches = surface.match(rigid.transform(pose, points).T)
         near = np.flatnonzero(np.abs(matches.distances) < MAX_DISTANCE_M)
         if len(near) < 6:
             return
-        rows, normals = matches.rows[near], matches.normals[near]
-        distances = matches.distances[near]
-        source_shift = _shift(source.twist, points[rows]) @ pose[:3, :3].T
-        target_shift = _shift(target.twist, matches.anchors[near])
+        measured, normals = points[matches.rows[near]], matches.normals[:, near]
+        anchors, distances = matches.anchors.T[near], matches.distances[near]
+        source_shift = _shift(source.twist, measured) @ pose[:3, :3].T
+        target_shift = _shift(target.twist, anchors)
         slopes = np.concatenate(
             [
-                jacobian(placed[rows] - pose[:3, 3], normals),
-                np.einsum("ij,ij->i", source_shift, normals)[:, None] * _basis(points[rows])
-                - np.einsum("ij,ij->i", target_shift, normals)[:, None]
-                * _basis(matches.anchors[near]),
+                jacobian(matches.places[:, near] - pose[:3, 3:], normals).T,
+                np.einsum("ij,ji->i", source_shift, normals)[:, None] * _basis(measured)
+                - np.einsum("ij,ji->i", target_shift, normals)[:, None] * _basis(anchors),
             ],
             axis=1,
         )
