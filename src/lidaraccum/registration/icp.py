@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from lidaraccum.data.frame import BoolArray
 from lidaraccum.geometry import rigid
+from lidaraccum.geometry.order import middle
 from lidaraccum.registration.plane_index import Matches
 from lidaraccum.registration.surface_map import SurfaceMap
 
@@ -93,8 +93,7 @@ def align(
 def moved(pose: rigid.Pose, step: NDArray[np.float64]) -> rigid.Pose:
     """A pose turned about its own place, then shifted, by a small step (6,), world axes."""
     result = pose.copy()
-    turned = Rotation.from_rotvec(step[:3]) * Rotation.from_matrix(pose[:3, :3])
-    result[:3, :3] = turned.as_matrix()
+    result[:3, :3] = rigid.rotation(step[:3]) @ pose[:3, :3]
     result[:3, 3] += step[3:]
     return result
 
@@ -134,7 +133,7 @@ def kernel_weights(matches: Matches, alike: BoolArray) -> NDArray[np.float64]:
     for group in (alike, ~alike):
         distances = matches.distances[group]
         if len(distances):
-            spread = 1.48 * float(np.median(np.abs(distances)))
+            spread = 1.48 * middle(np.abs(distances))
             scale = float(np.clip(GATE_SPREADS * spread, MIN_SCALE_M, MAX_SCALE_M))
             weights[group] /= (1.0 + (distances / scale) ** 2) ** 2
     return weights
@@ -184,7 +183,7 @@ def assess(
         pose,
         score=share * float((rarity * agreement).sum() / rarity.sum()),
         overlap=float(close.sum()) / max(len(points), 1),
-        residual_m=float(np.median(np.abs(matches.distances[close]))),
+        residual_m=middle(np.abs(matches.distances[close])),
         information=information / len(matches.rows),
     )
 

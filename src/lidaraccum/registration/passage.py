@@ -127,9 +127,8 @@ class Passage:
         self._last = scan.index, registered.world_from_sensor
         self._stamp = scan.raw.stamp
         if not self._detector.done:
-            points = scan.raw.points[scan.usable].astype(np.float64)
-            glimpse = Glimpse(points, registered.world_from_sensor, np.zeros(6))
-            self._recent.append((scan.raw, glimpse))
+            few, pose = scan.source(np.zeros(6)), registered.world_from_sensor
+            self._recent.append((scan.raw, Glimpse(scan.usable_points, few, pose, np.zeros(6))))
 
     def _given_pose(self, index: int) -> rigid.Pose:
         assert self.given is not None

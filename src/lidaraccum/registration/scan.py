@@ -63,6 +63,11 @@ class Scan:
         return deskewed(self.raw, twist, self.fractions)
 
     @property
+    def usable_points(self) -> NDArray[np.float32]:
+        """(K, 3) points that registration may use, as measured."""
+        return self.raw.points.take(np.flatnonzero(self.usable), axis=0)
+
+    @property
     def bends(self) -> bool:
         """Whether there is motion inside the sweep to be undone."""
         return self.fractions is not None

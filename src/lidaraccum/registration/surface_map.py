@@ -169,7 +169,7 @@ class SurfaceMap:
         scaled = _moved(points, pose[:3, :3], pose[:3, 3] - corner) * (1.0 / finest)
         floor = np.floor(scaled)
         cells = floor.astype(np.int64)
-        order, starts = voxel.group_by_key(voxel.cell_keys(cells.T))
+        order, starts = voxel.group_by_cell(cells)
         within = ((scaled - floor - 0.5) * finest).take(order, axis=1)
         moments = planes.summed_moments(within, starts)
         cells = cells.take(order.take(starts), axis=1)
@@ -201,7 +201,7 @@ def _merged(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Cells (3, V) and moments (10, V) of voxels whose edge is twice that of given ones, size."""
     coarse = cells >> 1
-    order, starts = voxel.group_by_key(voxel.cell_keys(coarse.T))
+    order, starts = voxel.group_by_cell(coarse)
     shift = ((cells & 1).astype(np.float64) - 0.5) * (size_m / 2)
     moved = planes.shift_moments(moments, shift).take(order, axis=1)
     return coarse.take(order.take(starts), axis=1), np.add.reduceat(moved, starts, axis=1)
