@@ -96,7 +96,7 @@ class Opening:
         """The first frames again and again, from the motion before, until it stays."""
         for _ in range(MAX_OPENING_PASSES):
             twist = self._first_twist(passed)
-            passed = self._run(clock, twist)
+            passed = self._run(clock, twist, self._passage.tracker.judge.first)
             change = np.abs(self._first_twist(passed) - twist)
             if change[3:].max() < SETTLED_M and change[:3].max() < SETTLED_RAD:
                 break
@@ -109,8 +109,13 @@ class Opening:
             return again
         return self._run(Compensated(), None)
 
-    def _run(self, clock: SweepClock, twist: NDArray[np.float64] | None) -> list[RegisteredFrame]:
-        self._passage.begin(clock, twist)
+    def _run(
+        self,
+        clock: SweepClock,
+        twist: NDArray[np.float64] | None,
+        hoped: float | None = None,
+    ) -> list[RegisteredFrame]:
+        self._passage.begin(clock, twist, hoped)
         return [self._passage.place(scan) for scan in self._scans]
 
     def _freed(self, passed: list[RegisteredFrame]) -> list[RegisteredFrame]:

@@ -57,9 +57,17 @@ class Passage:
         self._stamp: float | None = None
         self._clock_is_new = False
 
-    def begin(self, clock: SweepClock, twist: NDArray[np.float64] | None) -> None:
-        """Start with an empty map, from a motion (6,) over one frame interval or from none."""
-        self.tracker = Tracker(self.settings, self.pace, clock, twist)
+    def begin(
+        self,
+        clock: SweepClock,
+        twist: NDArray[np.float64] | None,
+        hoped: float | None = None,
+    ) -> None:
+        """Start with an empty map, from a motion (6,) over one frame interval or from none.
+
+        Where the second frame, so started, reaches most of a hoped score, no other motion is tried.
+        """
+        self.tracker = Tracker(self.settings, self.pace, clock, twist, hoped)
         self._last = self._stamp = None
         self._recent.clear()
 

@@ -76,6 +76,7 @@ class Tracker:
         pace: Pace,
         clock: SweepClock,
         twist: NDArray[np.float64] | None = None,
+        hoped: float | None = None,
     ) -> None:
         """Begin with an empty map.
 
@@ -84,13 +85,14 @@ class Tracker:
             pace: Shared with whoever sees the stamps.
             clock: How time runs within a sweep; may be replaced later.
             twist: (6,) motion over one frame interval at the first frame, or None: unknown.
+            hoped: Score that the second frame reached in this motion before, or None.
         """
         self.clock = clock
         self.twist = twist
         self._settings = settings
         self._pace = pace
         self._surface = SurfaceMap(settings.voxel_m, settings.max_range_m * 1.1)
-        self._judge = Judge(settings)
+        self.judge = Judge(settings, hoped)
         self._last: Fix | None = None
         self._first_origin = np.zeros(3)
         self._lost = 0
@@ -117,7 +119,7 @@ class Tracker:
         self.twist = self._twist_to(pose, steps)
         source = scan.source(self.twist)
         located = Located("given", assess(self._surface, source, pose))
-        quality = self._judge.judge(located, self._speed(pose, steps))
+        quality = self.judge.judge(located, self._speed(pose, steps))
         rival = refine(self._surface, source, Hypothesis("given", pose)).alignment
         away_m = float(np.linalg.norm(rival.world_from_sensor[:3, 3] - pose[:3, 3]))
         if away_m > CONTRADICTION_M and rival.score > CONTRADICTION_SHARE * located.alignment.score:
@@ -133,7 +135,7 @@ class Tracker:
         located = Located("steady", assess(self._surface, source, placed), sighted=True)
         self.open_axes.append(rail)
         self.twist = self._twist_to(placed, steps)
-        quality = self._judge.judge(located, self._speed(placed, steps))
+        quality = self.judge.judge(located, self._speed(placed, steps))
         return self._remember(scan, self.twist, placed, quality)
 
     def follow(self, scan: Scan, hints: tuple[Hypothesis, ...] = ()) -> RegisteredFrame:
@@ -172,7 +174,7 @@ class Tracker:
         first, found = expectation.starts[0], None
         if expectation.known:
             found = refine(self._surface, source, first)
-            if self._judge.trusts(found) and self._is_smooth(found, first, expectation.steps):
+            if self.judge.trusts(found) and self._is_smooth(found, first, expectation.steps):
                 return found
         interval_s = expectation.steps * self._pace.interval_s
         reach = Reach(
@@ -207,8 +209,8 @@ class Tracker:
         pose = located.alignment.world_from_sensor
         first = expectation.starts[0]
         is_smooth = not expectation.known or self._is_smooth(located, first, expectation.steps)
-        lost = self._judge.is_lost(located, is_smooth=is_smooth)
-        quality = self._judge.judge(located, self._speed(pose, expectation.steps))
+        lost = self.judge.is_lost(located, is_smooth=is_smooth)
+        quality = self.judge.judge(located, self._speed(pose, expectation.steps))
         self._lost = self._lost + 1 if lost else 0
         if lost:
             pose, quality = first.world_from_sensor, replace(quality, hypothesis=first.name)
@@ -218,7 +220,7 @@ class Tracker:
         elif self._lost <= PATIENCE:
             return self._registered(scan, scan.straightened(twist), pose, quality)
         else:
-            self._judge.forget()
+            self.judge.forget()
         return self._remember(scan, twist, pose, quality)
 
     def _remember(
