@@ -51,18 +51,24 @@ def group_by_key(keys: Keys) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return order, _changes(keys.take(order))
 
 
-def group_by_cell(
-    cells: NDArray[np.int64],
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The same for integer cells (3, N), sorted by x, then y, then z."""
+def group_by_cell(cells: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The same for whole-numbered cells (3, N), sorted by x, then y, then z."""
     first = cells.min(axis=1, keepdims=True)
-    x, y, z = cells - first
-    _, wide, high = extent = (cells.max(axis=1, keepdims=True) - first + 1).ravel().tolist()
-    row_bits = len(x).bit_length()
+    _, wide, high = extent = [
+        int(one) + 1 for one in (cells.max(axis=1, keepdims=True) - first).ravel()
+    ]
+    row_bits = cells.shape[1].bit_length()
     if math.prod(extent) >> (_MOST_BITS - row_bits):
-        return group_by_key(cell_keys(cells.T))
+        return group_by_key(cell_keys(cells.T.astype(np.int64)))
     # Cell and row in one number: to sort values takes half as long as to sort their rows.
-    packed = (((x * wide + y) * high + z) << row_bits) | np.arange(len(x))
+    x, y, z = (cells - first).astype(np.int32)
+    packed = x.astype(np.int64)
+    packed *= wide
+    packed += y
+    packed *= high
+    packed += z
+    packed <<= row_bits
+    packed |= np.arange(len(packed))
     packed.sort()
     return packed & ((1 << row_bits) - 1), _changes(packed >> row_bits)
 
@@ -78,7 +84,7 @@ def thin(points: NDArray[Any], size_m: float) -> NDArray[np.int64]:
     cells = np.floor(scaled)
     x, y, z = scaled - cells - 0.5
     away = x * x + y * y + z * z
-    order, starts = group_by_cell(cells.astype(np.int64))
+    order, starts = group_by_cell(cells)
     away = away.take(order)
     counts = np.diff(starts, append=len(order))
     nearest = np.flatnonzero(away == np.repeat(np.minimum.reduceat(away, starts), counts))

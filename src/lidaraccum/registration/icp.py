@@ -129,14 +129,15 @@ def kernel_weights(matches: Matches, alike: BoolArray) -> NDArray[np.float64]:
     Those that face one way (M,) have a scale of their own: much smooth ground would make outliers
     of all that stands on it.
     """
-    weights = matches.weights.copy()
-    for group in (alike, ~alike):
-        distances = matches.distances[group]
-        if len(distances):
-            spread = 1.48 * middle(np.abs(distances))
-            scale = float(np.clip(GATE_SPREADS * spread, MIN_SCALE_M, MAX_SCALE_M))
-            weights[group] /= (1.0 + (distances / scale) ** 2) ** 2
-    return weights
+    away = np.abs(matches.distances)
+    scale = np.where(alike, _scale(away[alike]), _scale(away[~alike]))
+    return matches.weights / (1.0 + (away / scale) ** 2) ** 2
+
+
+def _scale(away: NDArray[np.float64]) -> float:
+    """The kernel's scale for distances (M,), metres, without their signs."""
+    spread = 1.48 * middle(away) if len(away) else 0.0
+    return min(max(GATE_SPREADS * spread, MIN_SCALE_M), MAX_SCALE_M)
 
 
 def _solve(

@@ -67,19 +67,21 @@ class VoxelLevel:
         chosen = np.flatnonzero(self._table[_WEIGHT].take(self._columns))
         return self._keys.take(chosen), self._table[_PLANE].take(self._columns[chosen], axis=1)
 
-    def add(self, keys: voxel.Keys, moments: NDArray[np.float64], now: int) -> None:
-        """Merge unique sorted voxels (V,) with their points' moments (10, V)."""
-        self._make_room(keys)
-        at = self._columns.take(np.searchsorted(self._keys, keys))
-        seen = np.zeros((_ROWS, len(keys)))
-        seen[_MOMENTS] = self._table[_MOMENTS].take(at, axis=1) * FORGETTING + moments
-        mean, covariance = planes.mean_and_covariance(seen[_MOMENTS])
-        seen[_MEAN] = mean + voxel.voxel_centres(keys, self.size_m).T
-        enough = np.flatnonzero(seen[0] >= MIN_POINTS)
+    def add(self, cells: NDArray[np.int64], moments: NDArray[np.float64], now: int) -> None:
+        """Merge voxels, as unique sorted cells (3, V), with their points' moments (10, V)."""
+        at = self._columns_of(voxel.cell_keys(cells.T))
+        seen = np.zeros((_ROWS, len(at)))
+        merged = self._table[_MOMENTS].take(at, axis=1, out=seen[_MOMENTS], mode="clip")
+        merged *= FORGETTING
+        merged += moments
+        mean, covariance = planes.mean_and_covariance(merged)
+        seen[_MEAN] = mean + (cells + 0.5) * self.size_m
+        enough = np.flatnonzero(merged[0] >= MIN_POINTS)
         normals, variances = planes.plane_normals(covariance.take(enough, axis=1).T)
         seen[_NORMAL, enough], seen[_WEIGHT, enough] = normals.T, self._weights(variances.T)
         seen[_SEEN] = now
-        self._table[:, at] = seen
+        for row, values in zip(self._table, seen, strict=True):
+            row[at] = values
 
     def _weights(self, variances: NDArray[np.float64]) -> NDArray[np.float64]:
         """Weights (V,) of planes with variances (3, V), smallest first: 0 for no believable one."""
@@ -91,17 +93,18 @@ class VoxelLevel:
         )
         return is_flat * SENSOR_NOISE_M**2 / (SENSOR_NOISE_M**2 + np.maximum(least, 0.0))
 
-    def _make_room(self, keys: voxel.Keys) -> None:
-        at = np.searchsorted(self._keys, keys)
-        is_new = np.ones(len(keys), dtype=np.bool_)
-        inside = at < len(self)
-        is_new[inside] = self._keys[at[inside]] != keys[inside]
-        at, fresh = at[is_new], keys[is_new]
-        known = len(self)
-        self._columns = np.insert(self._columns, at, np.arange(known, known + len(fresh)))
-        self._keys = np.insert(self._keys, at, fresh)
+    def _columns_of(self, keys: voxel.Keys) -> NDArray[np.int64]:
+        """Columns (V,) of the table for unique sorted keys (V,); room is made for new ones."""
+        at, known = np.searchsorted(self._keys, keys), len(self)
+        is_new = np.append(self._keys, -1).take(at) != keys
+        columns = np.append(self._columns, 0).take(at)
+        fresh = np.flatnonzero(is_new)
+        columns[fresh] = np.arange(known, known + len(fresh))
+        self._columns = np.insert(self._columns, at[fresh], columns[fresh])
+        self._keys = np.insert(self._keys, at[fresh], keys[fresh])
         if len(self) > self._table.shape[1]:
             self._table = np.concatenate([self._table, np.zeros((_ROWS, len(self)))], axis=1)
+        return columns
 
     def keep(self, wanted: BoolArray) -> None:
         """Forget every voxel but the wanted (V,)."""
@@ -168,16 +171,15 @@ class SurfaceMap:
         corner = np.floor(pose[:3, 3] / coarsest) * coarsest
         scaled = _moved(points, pose[:3, :3], pose[:3, 3] - corner) * (1.0 / finest)
         floor = np.floor(scaled)
-        cells = floor.astype(np.int64)
-        order, starts = voxel.group_by_cell(cells)
+        order, starts = voxel.group_by_cell(floor)
         within = ((scaled - floor - 0.5) * finest).take(order, axis=1)
         moments = planes.summed_moments(within, starts)
-        cells = cells.take(order.take(starts), axis=1)
+        cells = floor.take(order.take(starts), axis=1).astype(np.int64)
         cells += np.round(corner / finest).astype(np.int64)[:, None]
         for level in self._levels:
             if level is not self._levels[0]:
                 cells, moments = _merged(cells, moments, level.size_m)
-            level.add(voxel.cell_keys(cells.T), moments, now)
+            level.add(cells, moments, now)
 
     def _forget_far(self, position: NDArray[np.float64], now: int) -> None:
         """Drop what is far from the sensor's position (3,) or was not seen for long."""
