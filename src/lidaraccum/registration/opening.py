@@ -87,10 +87,11 @@ class Opening:
         The misfit must be less than a share of that without the times.
         """
         by_times = self._settled(passed, timed)
+        hoped = self._passage.tracker.judge.first
         without = self._settled(passed, seeming)
         if _misfit(by_times) > share * _misfit(without):
             return without
-        return self._run(timed, self._first_twist(by_times))
+        return self._run(timed, self._first_twist(by_times), hoped)
 
     def _settled(self, passed: list[RegisteredFrame], clock: SweepClock) -> list[RegisteredFrame]:
         """The first frames again and again, from the motion before, until it stays."""
