@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lidaraccum.geometry.order import sorted_rows
+
 Keys = NDArray[np.int64]
 
 _BITS = 21
 _HALF = 1 << (_BITS - 1)
 _MASK = (1 << _BITS) - 1
-_MOST_BITS = 63
+_MOST = 1 << 62
 _ZERO_KEY = (_HALF << (2 * _BITS)) | (_HALF << _BITS) | _HALF
 
 
@@ -57,20 +59,16 @@ def group_by_cell(cells: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.in
     _, wide, high = extent = [
         int(one) + 1 for one in (cells.max(axis=1, keepdims=True) - first).ravel()
     ]
-    row_bits = cells.shape[1].bit_length()
-    if math.prod(extent) >> (_MOST_BITS - row_bits):
+    if math.prod(extent) * cells.shape[1] >= _MOST:
         return group_by_key(cell_keys(cells.T.astype(np.int64)))
-    # Cell and row in one number: to sort values takes half as long as to sort their rows.
     x, y, z = (cells - first).astype(np.int32)
-    packed = x.astype(np.int64)
-    packed *= wide
-    packed += y
-    packed *= high
-    packed += z
-    packed <<= row_bits
-    packed |= np.arange(len(packed))
-    packed.sort()
-    return packed & ((1 << row_bits) - 1), _changes(packed >> row_bits)
+    numbers = x.astype(np.int64)
+    numbers *= wide
+    numbers += y
+    numbers *= high
+    numbers += z
+    order, ordered = sorted_rows(numbers)
+    return order, _changes(ordered)
 
 
 def thin(points: NDArray[Any], size_m: float) -> NDArray[np.int64]:

@@ -108,6 +108,8 @@ class VoxelLevel:
 
     def keep(self, wanted: BoolArray) -> None:
         """Forget every voxel but the wanted (V,)."""
+        if wanted.all():
+            return
         is_kept = wanted.take(self._columns)
         self._keys = self._keys[is_kept]
         self._columns = (np.cumsum(wanted) - 1).take(self._columns[is_kept])
