@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -73,7 +74,7 @@ class Frame:
     def __len__(self) -> int:
         return len(self.points)
 
-    @property
+    @cached_property
     def returned(self) -> BoolArray:
         """(N,) bool: False for "no return" points, which lie at the sensor's own place."""
         if self.origin.any():

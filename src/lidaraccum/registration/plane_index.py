@@ -45,14 +45,20 @@ class PlaneIndex:
         voxels: Keys (P,) and planes (7, P: mean, normal, weight) of each size, coarsest first;
             each size is half the one before.
         coarsest_m: Edge of the coarsest voxels.
+        origin: (3,) whence keys and means count, world: a corner of the coarsest voxels.
     """
 
     def __init__(
-        self, voxels: Sequence[tuple[voxel.Keys, NDArray[np.float64]]], coarsest_m: float
+        self,
+        voxels: Sequence[tuple[voxel.Keys, NDArray[np.float64]]],
+        coarsest_m: float,
+        origin: NDArray[np.float64],
     ) -> None:
         self._halvings = len(voxels) - 1
         self._finest_m = coarsest_m / 2**self._halvings
+        self._first = np.round(origin / self._finest_m).astype(np.int64)[:, None]
         self._planes = np.concatenate([planes for _, planes in voxels], axis=1)
+        self._planes[:3] += origin[:, None]
         cells = [voxel.voxel_cells(keys).T for keys, _ in voxels]
         blocks = [_block_keys(one, halvings) for halvings, one in enumerate(cells)]
         self._blocks = np.append(np.unique(np.concatenate(blocks)), _NO_BLOCK)
@@ -68,7 +74,7 @@ class PlaneIndex:
 
     def match(self, places: NDArray[np.float64]) -> Matches:
         """Planes under places (3, N), metres, world coordinates."""
-        cells = np.floor(places * (1.0 / self._finest_m)).astype(np.int64)
+        cells = np.floor(places * (1.0 / self._finest_m)).astype(np.int64) - self._first
         keys = _block_keys(cells, self._halvings)
         block = np.searchsorted(self._blocks, keys)
         cell = (block << 3 * self._halvings) | _cell_numbers(cells, self._halvings)

@@ -84,7 +84,7 @@ def _picture(points: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
     cells = voxel.voxel_cells(np.unique(voxel.voxel_keys(points, CELL_M)))
     row, column = (cells[:, other] for other in range(3) if other != axis)
     flat = (row % CELLS) * CELLS + column % CELLS
-    storeys = np.bincount(flat, minlength=CELLS * CELLS).astype(np.float64)
+    storeys = np.bincount(flat, minlength=CELLS * CELLS).astype(np.float32)
     storeys[storeys < MIN_STOREYS] = 0.0
     return np.sqrt(np.minimum(storeys, 9.0)).reshape(CELLS, CELLS)
 

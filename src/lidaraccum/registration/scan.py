@@ -79,7 +79,7 @@ class Scan:
         Times in the file hold also where the sensor's motion was undone before.
         """
         if self.fractions is not None:
-            return (self.fractions * self.interval_s).astype(np.float32)
+            return (self.fractions * self.interval_s).astype(np.float32, copy=False)
         if self.raw.time_offset is not None:
             return self.raw.time_offset.astype(np.float32)
         return None

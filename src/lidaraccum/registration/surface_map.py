@@ -44,8 +44,8 @@ class VoxelLevel:
     """Voxels of one size, each with its points' moments about its centre and their plane.
 
     What is known of them is one table (18, room for V): moments; mean and unit normal of the
-    plane, world; its weight, 1 where it is as thin as the sensor's noise, 0 where it is not
-    believed; the frame that saw it last.
+    plane; its weight, 1 where it is as thin as the sensor's noise, 0 where it is not believed; the
+    frame that saw it last. All coordinates are the map's, about its origin.
     """
 
     def __init__(self, size_m: float) -> None:
@@ -59,7 +59,7 @@ class VoxelLevel:
 
     @property
     def means(self) -> NDArray[np.float64]:
-        """Means (3, V) of what the voxels saw, metres, world."""
+        """Means (3, V) of what the voxels saw, metres."""
         return self._table[_MEAN, : len(self)]
 
     def believed(self) -> tuple[voxel.Keys, NDArray[np.float64]]:
@@ -122,11 +122,15 @@ class VoxelLevel:
 
 
 class SurfaceMap:
-    """What the last frames saw around the sensor, in world coordinates, in bounded memory."""
+    """What the last frames saw around the sensor, in bounded memory.
+
+    It counts from a corner of voxels where it begins: worlds may start thousands of kilometres off.
+    """
 
     def __init__(self, voxel_m: float, radius_m: float, memory_frames: int = 100) -> None:
         self.radius_m = radius_m
         self.memory_frames = memory_frames
+        self._origin = np.zeros(3)
         self._levels = tuple(VoxelLevel(voxel_m * factor) for factor in (1, 2, 4))
         self._waiting: list[tuple[NDArray[Any], int, rigid.Pose]] = []
         self._indices: dict[int, PlaneIndex] = {}
@@ -150,14 +154,14 @@ class SurfaceMap:
         if finest not in self._indices:
             levels = self._levels[finest:]
             voxels = [level.believed() for level in reversed(levels)]
-            self._indices[finest] = PlaneIndex(voxels, levels[-1].size_m)
+            self._indices[finest] = PlaneIndex(voxels, levels[-1].size_m, self._origin)
         return self._indices[finest].match(places)
 
     @property
     def means(self) -> NDArray[np.float64]:
         """Means (3, V) of what the finest voxels saw, metres, world."""
         self._catch_up()
-        return self._levels[0].means
+        return self._levels[0].means + self._origin[:, None]
 
     def _catch_up(self) -> None:
         for points, now, pose in self._waiting:
@@ -171,13 +175,15 @@ class SurfaceMap:
         finest, coarsest = self._levels[0].size_m, self._levels[-1].size_m
         # About a corner of the coarsest voxels near the sensor the points keep their precision.
         corner = np.floor(pose[:3, 3] / coarsest) * coarsest
+        if not any(len(level) for level in self._levels):
+            self._origin = corner
         scaled = _moved(points, pose[:3, :3], pose[:3, 3] - corner) * (1.0 / finest)
         floor = np.floor(scaled)
         order, starts = voxel.group_by_cell(floor)
         within = ((scaled - floor - 0.5) * finest).take(order, axis=1)
         moments = planes.summed_moments(within, starts)
         cells = floor.take(order.take(starts), axis=1).astype(np.int64)
-        cells += np.round(corner / finest).astype(np.int64)[:, None]
+        cells += np.round((corner - self._origin) / finest).astype(np.int64)[:, None]
         for level in self._levels:
             if level is not self._levels[0]:
                 cells, moments = _merged(cells, moments, level.size_m)
@@ -185,8 +191,9 @@ class SurfaceMap:
 
     def _forget_far(self, position: NDArray[np.float64], now: int) -> None:
         """Drop what is far from the sensor's position (3,) or was not seen for long."""
+        place = (position - self._origin)[:, None]
         for level in self._levels:
-            near = np.abs(level.means - position[:, None]).max(axis=0) < self.radius_m
+            near = np.abs(level.means - place).max(axis=0) < self.radius_m
             level.keep(near & (now - level.last_seen <= self.memory_frames))
 
 
