@@ -41,6 +41,16 @@ def test_stacked_inverse_is_the_inverse_of_each(motion: rigid.Pose) -> None:
     np.testing.assert_allclose(rigid.invert(stack) @ stack, np.stack([np.eye(4)] * 2), atol=1e-9)
 
 
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-5, 0.3, 3.0, 7.0])
+def test_a_rotation_turns_about_its_axis_by_its_angle(angle: float) -> None:
+    axis = np.array([0.6, 0.0, 0.8])
+    turn = rigid.rotation(angle * axis)
+    np.testing.assert_allclose(turn @ axis, axis, atol=1e-15)
+    np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-15)
+    assert np.trace(turn) == pytest.approx(1 + 2 * np.cos(angle))
+    assert np.cross(axis, [0.0, 1.0, 0.0]) @ turn @ [0.0, 1.0, 0.0] == pytest.approx(np.sin(angle))
+
+
 def test_a_tiny_motion_survives_the_logarithm() -> None:
     twist = np.array([1e-10, 0, 0, 1.0, 2.0, 3.0])
     np.testing.assert_allclose(rigid.logarithm(rigid.exponential(twist)), twist, atol=1e-9)

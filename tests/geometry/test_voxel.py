@@ -44,17 +44,28 @@ def test_groups_are_the_equal_keys() -> None:
     np.testing.assert_array_equal(starts, [0, 2, 4])
 
 
+@pytest.mark.parametrize("reach", [50, 10**7], ids=["near", "too far for one number"])
+def test_groups_of_cells_are_those_of_their_keys(reach: int) -> None:
+    cells = np.floor(np.random.default_rng(3).uniform(-3, 3, (3, 2000)))
+    cells[:, 0] = reach, -reach, reach
+    order, starts = voxel.group_by_cell(cells)
+    keys = voxel.cell_keys(cells.T.astype(np.int64))
+    _, sizes = np.unique(keys, return_counts=True)
+    np.testing.assert_array_equal(np.sort(np.diff(starts, append=2000)), np.sort(sizes))
+    assert all(len(set(part)) == 1 for part in np.split(keys[order], starts[1:]))
+
+
 def test_moments_give_mean_and_covariance() -> None:
-    mean, covariance = planes.mean_and_covariance(planes.summed_moments(POINTS, np.array([0])))
-    np.testing.assert_allclose(mean[0], POINTS.mean(axis=0))
+    mean, covariance = planes.mean_and_covariance(planes.summed_moments(POINTS.T, np.array([0])))
+    np.testing.assert_allclose(mean[:, 0], POINTS.mean(axis=0))
     truth = np.cov(POINTS.T, bias=True)[np.triu_indices(3)]
-    np.testing.assert_allclose(covariance[0], truth, atol=1e-9)
+    np.testing.assert_allclose(covariance[:, 0], truth, atol=1e-9)
 
 
 def test_shifted_moments_are_those_of_shifted_points() -> None:
-    shift = np.array([[1.0, -2.0, 3.0]])
-    moved = planes.shift_moments(planes.summed_moments(POINTS, np.array([0])), shift)
-    again = planes.summed_moments(POINTS + shift, np.array([0]))
+    shift = np.array([[1.0], [-2.0], [3.0]])
+    moved = planes.shift_moments(planes.summed_moments(POINTS.T, np.array([0])), shift)
+    again = planes.summed_moments(POINTS.T + shift, np.array([0]))
     np.testing.assert_allclose(moved, again, rtol=1e-9)
 
 

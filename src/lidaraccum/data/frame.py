@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -73,7 +74,7 @@ class Frame:
     def __len__(self) -> int:
         return len(self.points)
 
-    @property
+    @cached_property
     def returned(self) -> BoolArray:
         """(N,) bool: False for "no return" points, which lie at the sensor's own place."""
         if self.origin.any():
@@ -84,8 +85,9 @@ class Frame:
     @property
     def ranges(self) -> NDArray[np.float32]:
         """(N,) distance from the sensor, metres; infinite where float32 cannot hold it."""
+        x, y, z = self.points.T
         with np.errstate(over="ignore"):
-            return np.linalg.norm(self.points, axis=1)
+            return np.asarray(np.sqrt(x * x + y * y + z * z))
 
     def with_points(self, points: FloatArray) -> Frame:
         """The same frame with its points elsewhere (deskewed, say): (N, 3), metres."""

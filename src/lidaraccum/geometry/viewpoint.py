@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.geometry.ground import LEAST_MOUNT_M, estimate_ground
+from lidaraccum.geometry.order import sorted_rows
 
 NEAREST_M, FARTHEST_M = 3.0, 60.0
 FARTHEST_ECHO_M = 1_000.0
@@ -80,7 +81,7 @@ def _hidden_share(points: NDArray[np.float64], place: NDArray[np.float64]) -> fl
     column = ((np.arctan2(ray[:, 1], ray[:, 0]) + np.pi) / STEP_RAD).astype(np.int64)
     row = ((np.arcsin(ray[:, 2] / ranges) + np.pi / 2) / STEP_RAD).astype(np.int64)
     pixel = column * 1024 + row
-    order = np.argsort(pixel, kind="stable")
-    same = pixel[order[1:]] == pixel[order[:-1]]
-    unlike = np.abs(np.diff(np.log(ranges[order]))) > UNLIKE
+    order, pixel = sorted_rows(pixel)
+    unlike = np.abs(np.diff(np.log(ranges.take(order)))) > UNLIKE
+    same = pixel[1:] == pixel[:-1]
     return float(np.count_nonzero(same & unlike) / len(points))

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from lidaraccum.geometry.order import sorted_rows
 
 Keys = NDArray[np.int64]
 
 _BITS = 21
 _HALF = 1 << (_BITS - 1)
 _MASK = (1 << _BITS) - 1
+_MOST = 1 << 62
+_ZERO_KEY = (_HALF << (2 * _BITS)) | (_HALF << _BITS) | _HALF
 
 
 def voxel_keys(points: NDArray[Any], size_m: float) -> Keys:
@@ -19,8 +24,7 @@ def voxel_keys(points: NDArray[Any], size_m: float) -> Keys:
 
     Sorted keys are sorted by x, then y, then z. Cells repeat beyond a million voxels from 0.
     """
-    cell = np.floor(points * (1.0 / size_m)).astype(np.int64) + _HALF
-    return (cell[:, 0] << (2 * _BITS)) | (cell[:, 1] << _BITS) | cell[:, 2]
+    return cell_keys(np.floor(points * (1.0 / size_m)).astype(np.int64))
 
 
 def voxel_cells(keys: Keys) -> NDArray[np.int64]:
@@ -30,8 +34,12 @@ def voxel_cells(keys: Keys) -> NDArray[np.int64]:
 
 def cell_keys(cells: NDArray[np.int64]) -> Keys:
     """Keys (N,) of integer cells (N, 3): the inverse of `voxel_cells`."""
-    shifted = cells + _HALF
-    return (shifted[:, 0] << (2 * _BITS)) | (shifted[:, 1] << _BITS) | shifted[:, 2]
+    x, y, z = cells.T
+    keys = (x << _BITS) + y
+    keys <<= _BITS
+    keys += z
+    keys += _ZERO_KEY
+    return keys
 
 
 def voxel_centres(keys: Keys, size_m: float) -> NDArray[np.float64]:
@@ -42,10 +50,25 @@ def voxel_centres(keys: Keys, size_m: float) -> NDArray[np.float64]:
 def group_by_key(keys: Keys) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """An order (N,) that sorts keys (N,), and where each group of equal keys starts in it (V,)."""
     order = np.argsort(keys)
-    ordered = keys[order]
-    is_first = np.ones(len(keys), dtype=np.bool_)
-    is_first[1:] = ordered[1:] != ordered[:-1]
-    return order, np.flatnonzero(is_first)
+    return order, _changes(keys.take(order))
+
+
+def group_by_cell(cells: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The same for whole-numbered cells (3, N), sorted by x, then y, then z."""
+    first = cells.min(axis=1, keepdims=True)
+    _, wide, high = extent = [
+        int(one) + 1 for one in (cells.max(axis=1, keepdims=True) - first).ravel()
+    ]
+    if math.prod(extent) * cells.shape[1] >= _MOST:
+        return group_by_key(cell_keys(cells.T.astype(np.int64)))
+    x, y, z = (cells - first).astype(np.int32)
+    numbers = x.astype(np.int64)
+    numbers *= wide
+    numbers += y
+    numbers *= high
+    numbers += z
+    order, ordered = sorted_rows(numbers)
+    return order, _changes(ordered)
 
 
 def thin(points: NDArray[Any], size_m: float) -> NDArray[np.int64]:
@@ -55,14 +78,20 @@ def thin(points: NDArray[Any], size_m: float) -> NDArray[np.int64]:
     """
     if len(points) == 0:
         return np.zeros(0, dtype=np.int64)
-    keys = voxel_keys(points, size_m)
-    scaled = points * (1.0 / size_m)
-    away = ((scaled - np.floor(scaled) - 0.5) ** 2).sum(axis=1)
-    order, starts = group_by_key(keys)
-    away = away[order]
-    counts = np.diff(np.append(starts, len(keys)))
+    scaled = np.ascontiguousarray(points.T) * (1.0 / size_m)
+    cells = np.floor(scaled)
+    x, y, z = scaled - cells - 0.5
+    away = x * x + y * y + z * z
+    order, starts = group_by_cell(cells)
+    away = away.take(order)
+    counts = np.diff(starts, append=len(order))
     nearest = np.flatnonzero(away == np.repeat(np.minimum.reduceat(away, starts), counts))
     voxel_of_nearest = np.searchsorted(starts, nearest, side="right")
-    first_of_voxel = np.ones(len(nearest), dtype=np.bool_)
-    first_of_voxel[1:] = voxel_of_nearest[1:] != voxel_of_nearest[:-1]
-    return order[nearest[first_of_voxel]]
+    return order[nearest[_changes(voxel_of_nearest)]]
+
+
+def _changes(ordered: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Where each run of equal values begins, in values (N,) that come in runs."""
+    is_first = np.ones(len(ordered), dtype=np.bool_)
+    np.not_equal(ordered[1:], ordered[:-1], out=is_first[1:])
+    return np.flatnonzero(is_first)

@@ -40,14 +40,14 @@ def open_axis(
     surface: SurfaceMap, points: NDArray[np.float64], pose: rigid.Pose
 ) -> NDArray[np.float64] | None:
     """The direction (3,), world, that no plane under points (M, 3) fixes; None where all are."""
-    matches = surface.match(rigid.transform(pose, points))
+    matches = surface.match(rigid.transform(pose, points).T)
     weights = matches.weights * (np.abs(matches.distances) < SCORE_GATE_M)
     total = float(weights.sum())
     if total <= 0:
         return None
-    spread = (matches.normals * weights[:, None]).T @ matches.normals / total
+    spread = (matches.normals * weights) @ matches.normals.T / total
     axis = np.linalg.eigh(spread)[1][:, 0]
-    lean = (matches.normals @ axis) ** 2
+    lean = (axis @ matches.normals) ** 2
     across = float((weights * lean)[lean > LEANING**2].sum())
     return np.asarray(axis) if across < OPEN_BELOW * total else None
 
@@ -91,32 +91,30 @@ class SteadyMotion:
         count = np.ceil(reach_m / STATION_M)
         places = STATION_M * np.arange(-count, count + 1)
         rails = np.stack([self._on_rail(place) for place in places])
-
-        def seen(looks: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-            return [self.agreement(self._poses(rails, places, float(at))) for at in looks]
-
         looks = np.arange(-reach_m, reach_m + STEP_M / 2, STEP_M)
-        coarse = seen(looks)
+        coarse = self._agreements(_between(rails, places, looks))
         mean = np.array([_mean_known(one) for one in coarse])
         middle = looks[int(np.argmax(mean))]
         finer = np.arange(middle - STEP_M, middle + STEP_M, FINE_STEP_M)
-        fine = seen(finer)
+        motions = _between(rails, places, finer)
+        fine = self._agreements(motions)
         at = int(np.argmax([_mean_known(one) for one in fine]))
         apart = np.flatnonzero(np.abs(looks - finer[at]) > APART_M)
         rival = coarse[apart[int(np.argmax(mean[apart]))]] if len(apart) else fine[at]
-        poses = self._poses(rails, places, float(finer[at]))
         moves = abs(float(finer[at])) > APART_M
-        return Steady(poses, is_clear=moves and gain(fine[at], rival) > SURE)
+        return Steady(list(motions[at]), is_clear=moves and gain(fine[at], rival) > SURE)
 
     def agreement(self, poses: Sequence[rigid.Pose]) -> NDArray[np.float64]:
         """What all pairs of frames say of their poses (4, 4): (K,)."""
-        pairs = combinations(range(len(self._sights)), 2)
-        return np.concatenate(
-            [
-                self._sights[i].agreement(self._sights[j], rigid.invert(poses[i]) @ poses[j])
-                for i, j in pairs
-            ]
-        )
+        return self._agreements(np.stack(poses)[None])[0]
+
+    def _agreements(self, motions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The same (L, K) of many motions, each of all frames (L, T, 4, 4)."""
+        said = []
+        for i, j in combinations(range(len(self._sights)), 2):
+            between = rigid.invert(motions[:, i]) @ motions[:, j]
+            said.append(self._sights[i].agreement(self._sights[j], between))
+        return np.concatenate(said, axis=1)
 
     def _on_rail(self, place_m: float) -> NDArray[np.float64]:
         """Twists (T, 6) to the frames, so far along the axis a step, all else as planes have it."""
@@ -130,14 +128,16 @@ class SteadyMotion:
             )
         return np.stack(twists)
 
-    def _poses(
-        self, rails: NDArray[np.float64], places: NDArray[np.float64], place: float
-    ) -> list[rigid.Pose]:
-        """Poses at a place among stations (S,), each with its twists (S, T, 6)."""
-        after = int(np.clip(np.searchsorted(places, place), 1, len(places) - 1))
-        share = (place - places[after - 1]) / (places[after] - places[after - 1])
-        twists = rails[after - 1] + share * (rails[after] - rails[after - 1])
-        return [rigid.exponential(twist) for twist in twists]
+
+def _between(
+    rails: NDArray[np.float64], stations: NDArray[np.float64], places: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Poses (L, T, 4, 4) at places (L,) among stations (S,), each with its twists (S, T, 6)."""
+    after = np.clip(np.searchsorted(stations, places), 1, len(stations) - 1)
+    share = (places - stations[after - 1]) / (stations[after] - stations[after - 1])
+    twists = rails[after - 1] + share[:, None, None] * (rails[after] - rails[after - 1])
+    flat = twists.reshape(-1, 6)
+    return rigid.exponentials(flat, np.ones(len(flat))).reshape(*twists.shape[:2], 4, 4)
 
 
 def _mean_known(agreement: NDArray[np.float64]) -> float:

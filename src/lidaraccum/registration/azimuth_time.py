@@ -8,7 +8,9 @@ distances determine it. It comes out as a sawtooth: its place is the seam, its s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,12 +44,14 @@ class Glimpse:
     """One frame of a window whose sweep is looked at.
 
     Attributes:
-        points: (M, 3) float64 usable points as measured, metres, sensor coordinates.
+        points: (M, 3) usable points as measured, metres, sensor coordinates.
+        few: (K, 3) float64 thin choice of them.
         world_from_sensor: (4, 4) estimate.
         twist: (6,) motion over one frame interval about this frame, sensor axes.
     """
 
-    points: NDArray[np.float64]
+    points: NDArray[np.float32]
+    few: NDArray[np.float64]
     world_from_sensor: rigid.Pose
     twist: NDArray[np.float64]
 
@@ -82,28 +86,31 @@ class AzimuthTime:
         self._matrix = np.zeros((2 * SECTORS, 2 * SECTORS))
         self._vector = np.zeros(2 * SECTORS)
 
-    def add(self, target: Glimpse, source: Glimpse) -> None:
-        """Learn from one pair of frames; their relative pose is solved along and then dropped."""
+    def add(self, target: Glimpse, sources: Sequence[Glimpse]) -> None:
+        """Learn from pairs of frames; their relative poses are solved along and then dropped."""
         surface = SurfaceMap(self._settings.voxel_m, radius_m=2 * MAX_RANGE_M)
-        surface.insert(_thinned(target.points, SURFACE_M), now=0)
-        points = _thinned(source.points, self._settings.source_voxel_m)
+        near = _near(target.points)
+        surface.insert(near.take(voxel.thin(near, SURFACE_M), axis=0), now=0)
+        for source in sources:
+            self._learn(surface, target, source)
+
+    def _learn(self, surface: SurfaceMap, target: Glimpse, source: Glimpse) -> None:
+        points = _near(source.few)
         start = rigid.invert(target.world_from_sensor) @ source.world_from_sensor
         pose = align(surface, points, start)
-        placed = rigid.transform(pose, points)
-        matches = surface.match(placed)
+        matches = surface.match(rigid.transform(pose, points).T)
         near = np.flatnonzero(np.abs(matches.distances) < MAX_DISTANCE_M)
         if len(near) < 6:
             return
-        rows, normals = matches.rows[near], matches.normals[near]
-        distances = matches.distances[near]
-        source_shift = _shift(source.twist, points[rows]) @ pose[:3, :3].T
-        target_shift = _shift(target.twist, matches.anchors[near])
+        measured, normals = points[matches.rows[near]], matches.normals[:, near]
+        anchors, distances = matches.anchors.T[near], matches.distances[near]
+        source_shift = _shift(source.twist, measured) @ pose[:3, :3].T
+        target_shift = _shift(target.twist, anchors)
         slopes = np.concatenate(
             [
-                jacobian(placed[rows] - pose[:3, 3], normals),
-                np.einsum("ij,ij->i", source_shift, normals)[:, None] * _basis(points[rows])
-                - np.einsum("ij,ij->i", target_shift, normals)[:, None]
-                * _basis(matches.anchors[near]),
+                jacobian(matches.places[:, near] - pose[:3, 3:], normals).T,
+                np.einsum("ij,ji->i", source_shift, normals)[:, None] * _basis(measured)
+                - np.einsum("ij,ji->i", target_shift, normals)[:, None] * _basis(anchors),
             ],
             axis=1,
         )
@@ -152,9 +159,8 @@ class AzimuthTime:
         return SweepHeight(-float(times @ self._vector) / curvature, curvature**-0.5)
 
 
-def _thinned(points: NDArray[np.float64], size_m: float) -> NDArray[np.float64]:
-    near = points[np.linalg.norm(points, axis=1) < MAX_RANGE_M]
-    return near[voxel.thin(near, size_m)]
+def _near(points: NDArray[Any]) -> NDArray[Any]:
+    return points.compress((points * points) @ np.ones(3, points.dtype) < MAX_RANGE_M**2, axis=0)
 
 
 def _shift(twist: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:

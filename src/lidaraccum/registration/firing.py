@@ -8,10 +8,13 @@ the motion predicts. No pose better than a rough one is needed, and no order of 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from lidaraccum.geometry.order import middle
 
 BEAM_DEG = 0.1
 """Points within such a band of elevation are taken to be on one beam."""
@@ -64,13 +67,9 @@ def is_as_measured(points: NDArray[np.floating], twist: NDArray[np.float64]) -> 
     if steps is None:
         return None
     change, azimuth, distance = steps
-    shares, errors = zip(
-        *(
-            _fit(change, _predicted_change(azimuth, distance, twist, seam))
-            for seam in 2 * np.pi * np.arange(SEAMS) / SEAMS
-        ),
-        strict=True,
-    )
+    every_seam = 2 * np.pi * np.arange(SEAMS) / SEAMS
+    predicted = _predicted_changes(azimuth, distance, twist, every_seam)
+    shares, errors = zip(*(_fit(change, one) for one in predicted), strict=True)
     if max(errors) > MAX_ERROR:
         return None
     largest = max(abs(share) for share in shares)
@@ -83,11 +82,11 @@ def _steps(
     points: NDArray[np.floating],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
     """Relative deviation from the usual step, azimuth and range of neighbours on one beam (K,)."""
-    x, y, z = points.astype(np.float64).T
-    distance, azimuth = np.hypot(x, y), np.arctan2(y, x)
+    x, y, z = np.ascontiguousarray(points.T, dtype=np.float64)
+    distance, azimuth = np.sqrt(x * x + y * y), np.arctan2(y, x)
     beam = np.floor(np.rad2deg(np.arctan2(z, distance)) / BEAM_DEG)
     order = np.argsort(beam * 8.0 + azimuth)
-    distance, azimuth, beam = distance[order], azimuth[order], beam[order]
+    distance, azimuth, beam = distance.take(order), azimuth.take(order), beam.take(order)
     step, middle = np.diff(azimuth), 0.5 * (distance[1:] + distance[:-1])
     usable = (
         (beam[1:] == beam[:-1])
@@ -111,29 +110,32 @@ def _steps(
     return step / np.median(step) - 1.0, azimuth[regular], middle[regular]
 
 
-def _predicted_change(
+def _predicted_changes(
     azimuth: NDArray[np.float64],
     distance: NDArray[np.float64],
     twist: NDArray[np.float64],
-    seam_rad: float,
-) -> NDArray[np.float64]:
-    """Relative change (K,) of the steps, had a clockwise sweep been compensated."""
-    time = np.mod(-(azimuth - seam_rad) / (2 * np.pi), 1.0) - 0.5
-    forward, left = twist[3], twist[4]
-    outward = np.cos(azimuth) * forward + np.sin(azimuth) * left
-    along = -np.sin(azimuth) * forward + np.cos(azimuth) * left
-    return -(along / distance + twist[2]) / (2 * np.pi) - time * outward / distance
+    seams_rad: NDArray[np.float64],
+) -> Iterator[NDArray[np.float64]]:
+    """Relative change (K,) of the steps, had a clockwise sweep been compensated, for each seam."""
+    cosine, sine = np.cos(azimuth), np.sin(azimuth)
+    outward = (cosine * twist[3] + sine * twist[4]) / distance
+    along = (cosine * twist[4] - sine * twist[3]) / distance
+    steady = -(along + twist[2]) / (2 * np.pi)
+    for seam_rad in seams_rad:
+        turn = (seam_rad - azimuth) / (2 * np.pi)
+        yield steady - (turn - np.floor(turn) - 0.5) * outward
 
 
 def _fit(change: NDArray[np.float64], predicted: NDArray[np.float64]) -> tuple[float, float]:
     """Robust slope of the found over the predicted change, and its standard error."""
-    design = np.stack([predicted, np.ones_like(predicted)], axis=1)
+    design = np.stack([predicted, np.ones_like(predicted)])
     weights = np.ones(len(change))
     for _ in range(4):
-        normal_matrix = design.T @ (weights[:, None] * design) + 1e-12 * np.eye(2)
-        slope = np.linalg.solve(normal_matrix, design.T @ (weights * change))
-        left = change - design @ slope
-        spread = 1.48 * float(np.median(np.abs(left))) + 1e-6
+        weighted = design * weights
+        normal_matrix = weighted @ design.T + 1e-12 * np.eye(2)
+        slope = np.linalg.solve(normal_matrix, weighted @ change)
+        left = change - slope @ design
+        spread = 1.48 * middle(np.abs(left)) + 1e-6
         weights = 1.0 / (1.0 + (left / (2 * spread)) ** 2) ** 2
     error = spread * float(np.sqrt(np.linalg.inv(normal_matrix)[0, 0]))
     return float(slope[0]), error

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from lidaraccum.data.frame import BoolArray
 from lidaraccum.geometry import rigid
-from lidaraccum.registration.surface_map import Matches, SurfaceMap
+from lidaraccum.geometry.order import middle
+from lidaraccum.registration.plane_index import Matches
+from lidaraccum.registration.surface_map import SurfaceMap
 
 GATE_SPREADS = 3.0
 """The kernel's scale, in spreads (1.48 median) of the distances of the iteration before."""
@@ -73,16 +74,16 @@ def align(
     it stays where it is.
     """
     pose = start.copy()
+    columns = np.ascontiguousarray(points.T)
     hold = HOLD * np.eye(6)
     if rail is not None:
         hold[3:, 3:] += RAIL * np.outer(rail, rail)
     for _ in range(iterations):
-        placed = rigid.transform(pose, points)
-        matches = surface.match(placed, finest)
+        matches = surface.match(_placed(columns, pose), finest)
         if len(matches.rows) < 6:
-            return pose
+            break
         away = np.concatenate([np.zeros(3), pose[:3, 3] - start[:3, 3]])
-        step = _solve(matches, placed[matches.rows] - pose[:3, 3], away, hold)
+        step = _solve(matches, pose[:3, 3], away, hold)
         pose = moved(pose, step)
         if np.abs(step[:3]).max() < STOP_RAD and np.abs(step[3:]).max() < STOP_M:
             break
@@ -92,25 +93,34 @@ def align(
 def moved(pose: rigid.Pose, step: NDArray[np.float64]) -> rigid.Pose:
     """A pose turned about its own place, then shifted, by a small step (6,), world axes."""
     result = pose.copy()
-    turned = Rotation.from_rotvec(step[:3]) * Rotation.from_matrix(pose[:3, :3])
-    result[:3, :3] = turned.as_matrix()
+    result[:3, :3] = rigid.rotation(step[:3]) @ pose[:3, :3]
     result[:3, 3] += step[3:]
     return result
+
+
+def _placed(columns: NDArray[np.float64], pose: rigid.Pose) -> NDArray[np.float64]:
+    """Where coordinates (3, N) lie in the world."""
+    return pose[:3, :3] @ columns + pose[:3, 3:]
 
 
 def main_face(matches: Matches) -> tuple[NDArray[np.float64], BoolArray]:
     """The way (3,) that most planes face, as the ground's do, and which (M,) face it; else none."""
     normals, weights = matches.normals, matches.weights
-    spread = (normals * weights[:, None]).T @ normals / max(float(weights.sum()), 1e-9)
+    spread = (normals * weights) @ normals.T / max(float(weights.sum()), 1e-9)
     share, axes = np.linalg.eigh(spread)
     if share[2] < MOST_FACE:
-        return axes[:, 2], np.zeros(len(normals), dtype=np.bool_)
-    return axes[:, 2], np.abs(normals @ axes[:, 2]) > LEANING
+        return axes[:, 2], np.zeros(len(weights), dtype=np.bool_)
+    return axes[:, 2], np.abs(axes[:, 2] @ normals) > LEANING
 
 
 def jacobian(arms: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How distances (M,) change with a step (6,): arms (M, 3) reach from the sensor."""
-    return np.concatenate([np.cross(arms, normals), normals], axis=1)
+    """How distances change with a step: (6, M), of arms (3, M) from the sensor, normals (3, M)."""
+    slopes = np.empty((6, arms.shape[1]))
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        np.subtract(arms[i] * normals[j], arms[j] * normals[i], out=slopes[k])
+    slopes[3:] = normals
+    return slopes
 
 
 def kernel_weights(matches: Matches, alike: BoolArray) -> NDArray[np.float64]:
@@ -119,23 +129,26 @@ def kernel_weights(matches: Matches, alike: BoolArray) -> NDArray[np.float64]:
     Those that face one way (M,) have a scale of their own: much smooth ground would make outliers
     of all that stands on it.
     """
-    weights = matches.weights.copy()
-    for group in (alike, ~alike):
-        distances = matches.distances[group]
-        if len(distances):
-            spread = 1.48 * float(np.median(np.abs(distances)))
-            scale = float(np.clip(GATE_SPREADS * spread, MIN_SCALE_M, MAX_SCALE_M))
-            weights[group] /= (1.0 + (distances / scale) ** 2) ** 2
-    return weights
+    away = np.abs(matches.distances)
+    scale = np.where(alike, _scale(away[alike]), _scale(away[~alike]))
+    return matches.weights / (1.0 + (away / scale) ** 2) ** 2
+
+
+def _scale(away: NDArray[np.float64]) -> float:
+    """The kernel's scale for distances (M,), metres, without their signs."""
+    spread = 1.48 * middle(away) if len(away) else 0.0
+    return min(max(GATE_SPREADS * spread, MIN_SCALE_M), MAX_SCALE_M)
 
 
 def _solve(
     matches: Matches,
-    arms: NDArray[np.float64],
+    place: NDArray[np.float64],
     away: NDArray[np.float64],
     hold: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """One step (6,); ``hold`` (6, 6), per plane, draws back by what it is ``away`` (6,).
+    """One step (6,) of a sensor at a place (3,).
+
+    ``hold`` (6, 6), per plane, draws back by what it is ``away`` (6,).
 
     The little by which each of the planes leans that face one way is roughness, or an error: a
     voxel that one beam crossed knows its plane along the beam only, so the same beam a little
@@ -143,21 +156,20 @@ def _solve(
     """
     face, alike = main_face(matches)
     normals = matches.normals
-    normals = np.where(alike[:, None], (normals @ face)[:, None] * face, normals)
+    normals = np.where(alike, (face @ normals) * face[:, None], normals)
     weights = kernel_weights(matches, alike)
-    slopes = jacobian(arms, normals)
-    weighted = slopes * weights[:, None]
+    slopes = jacobian(matches.places - place[:, None], normals)
+    weighted = slopes * weights
     held = weights.sum() * hold
-    gradient = weighted.T @ matches.distances + held @ away
-    return -np.linalg.solve(weighted.T @ slopes + held, gradient)
+    gradient = weighted @ matches.distances + held @ away
+    return -np.linalg.solve(weighted @ slopes.T + held, gradient)
 
 
 def assess(
     surface: SurfaceMap, points: NDArray[np.float64], pose: rigid.Pose, *, finest: int = 0
 ) -> Alignment:
     """How well the map speaks for a pose of points (M, 3), sensor coordinates."""
-    placed = rigid.transform(pose, points)
-    matches = surface.match(placed, finest)
+    matches = surface.match(_placed(points.T, pose), finest)
     close = np.abs(matches.distances) < SCORE_GATE_M
     if close.sum() < 6:
         return Alignment(pose, 0.0, 0.0, float("inf"), np.zeros((6, 6)))
@@ -165,20 +177,20 @@ def assess(
     rarity = _rarity(matches.normals)
     # Points without a plane (new space, clutter) count as the average point does.
     share = len(matches.rows) / max(len(points), 1)
-    slopes = jacobian(placed[matches.rows] - pose[:3, 3], matches.normals)
+    slopes = jacobian(matches.places - pose[:3, 3:], matches.normals)
     weights = kernel_weights(matches, main_face(matches)[1])
-    information = (slopes * weights[:, None]).T @ slopes
+    information = (slopes * weights) @ slopes.T
     return Alignment(
         pose,
         score=share * float((rarity * agreement).sum() / rarity.sum()),
         overlap=float(close.sum()) / max(len(points), 1),
-        residual_m=float(np.median(np.abs(matches.distances[close]))),
+        residual_m=middle(np.abs(matches.distances[close])),
         information=information / len(matches.rows),
     )
 
 
 def _rarity(normals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Leverage (M,) of each normal: large where few others point its way."""
-    spread = normals.T @ normals / len(normals)
+    """Leverage (M,) of each normal (3, M): large where few others point its way."""
+    spread = normals @ normals.T / normals.shape[1]
     inverse = np.linalg.inv(spread + 0.01 * np.eye(3))
-    return np.einsum("ij,jk,ik->i", normals, inverse, normals)
+    return np.einsum("ji,ji->i", normals, inverse @ normals)

@@ -109,7 +109,7 @@ def proposed(
 ) -> list[Hypothesis]:
     """Hypotheses from correlating pictures of the map and the frame about the expected pose."""
     place = expected[:3, 3]
-    target = surface.levels[0].means - place
+    target = surface.means.T - place
     turned = source @ expected[:3, :3].T
     thin_source = turned[voxel.thin(turned, CELL_M)]
     found = []

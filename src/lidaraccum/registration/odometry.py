@@ -14,7 +14,7 @@ from lidaraccum.data.registered import RegisteredFrame
 from lidaraccum.errors import InputError
 from lidaraccum.registration.opening import Opening, step_between
 from lidaraccum.registration.passage import Passage
-from lidaraccum.registration.scan import StaticMask
+from lidaraccum.registration.scan import StaticMask, prepare
 from lidaraccum.registration.settings import RegistrationSettings
 from lidaraccum.registration.tracker import CONTRADICTION_M
 
@@ -48,19 +48,22 @@ def register(
     """
     settings = settings or RegistrationSettings()
     stream = iter(enumerate(frames))
-    opening = list(islice(stream, settings.lookahead))
-    passage = Passage(settings, given, static_mask)
+    opening = [
+        prepare(index, frame, settings, static_mask)
+        for index, frame in islice(stream, settings.lookahead)
+    ]
+    passage = Passage(settings, given)
     opened = Opening(passage, opening).solve()
     if given is not None and settings.poses_mode == "given":
         # Poses of another drive, inverted or all identity show in the first steps already.
-        free = Opening(Passage(settings, None, static_mask), opening).solve()
+        free = Opening(Passage(settings, None), opening).solve()
         opened = compared(opened, free)
     yield from opened
     count = len(opening)
     del opening
     for index, frame in stream:
         count += 1
-        yield passage.follow(index, frame)
+        yield passage.follow(prepare(index, frame, settings, static_mask))
     if given is not None and len(given) != count:
         raise InputError(f"there are {len(given)} poses for {count} frames")
 

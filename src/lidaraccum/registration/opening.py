@@ -9,13 +9,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from lidaraccum.data.frame import Frame
 from lidaraccum.data.registered import RegisteredFrame
 from lidaraccum.geometry import rigid
 from lidaraccum.registration.along import APART_M, SURE, SteadyMotion
 from lidaraccum.registration.deskew import Compensated, SweepClock, TimedSweep
 from lidaraccum.registration.passage import Passage
 from lidaraccum.registration.quality import ADRIFT
+from lidaraccum.registration.scan import Scan
 from lidaraccum.registration.sightlines import gain
 from lidaraccum.registration.surface_map import SurfaceMap
 from lidaraccum.registration.tracker import MAX_ACCELERATION, SMOOTH_M
@@ -38,19 +38,17 @@ NO_WORSE = 1.0
 LEAST_OVERLAP = 1e-3
 """Frames of which no more fits than this fit nowhere, whatever is near."""
 
-Indexed = tuple[int, Frame]
-
 
 class Opening:
     """The first frames of a sequence, which pass as often as their motion needs to settle."""
 
-    def __init__(self, passage: Passage, frames: Sequence[Indexed]) -> None:
+    def __init__(self, passage: Passage, scans: Sequence[Scan]) -> None:
         self._passage = passage
-        self._frames = frames
+        self._scans = scans
 
     def solve(self) -> list[RegisteredFrame]:
         """The frames with their poses; the passage stands behind the last of them."""
-        if not self._frames:
+        if not self._scans:
             return []
         passed = self._solve()
         open_axes = self._passage.tracker.open_axes
@@ -61,10 +59,10 @@ class Opening:
 
     def _solve(self) -> list[RegisteredFrame]:
         """Solve the first frames together: once to learn the motion, once more with it."""
-        for (_, earlier), (_, later) in pairwise(self._frames):
-            self._passage.pace.see(earlier.stamp, later.stamp)
+        for earlier, later in pairwise(self._scans):
+            self._passage.pace.see(earlier.raw.stamp, later.raw.stamp)
         wanted = self._passage.settings.deskew == "auto"
-        has_times = wanted and self._frames[0][1].time_offset is not None
+        has_times = wanted and self._scans[0].raw.time_offset is not None
         first_clock: SweepClock = TimedSweep() if has_times else Compensated()
         passed = self._run(first_clock, None)
         if len(passed) < 2:
@@ -89,16 +87,17 @@ class Opening:
         The misfit must be less than a share of that without the times.
         """
         by_times = self._settled(passed, timed)
+        hoped = self._passage.tracker.judge.first
         without = self._settled(passed, seeming)
         if _misfit(by_times) > share * _misfit(without):
             return without
-        return self._run(timed, self._first_twist(by_times))
+        return self._run(timed, self._first_twist(by_times), hoped)
 
     def _settled(self, passed: list[RegisteredFrame], clock: SweepClock) -> list[RegisteredFrame]:
         """The first frames again and again, from the motion before, until it stays."""
         for _ in range(MAX_OPENING_PASSES):
             twist = self._first_twist(passed)
-            passed = self._run(clock, twist)
+            passed = self._run(clock, twist, self._passage.tracker.judge.first)
             change = np.abs(self._first_twist(passed) - twist)
             if change[3:].max() < SETTLED_M and change[:3].max() < SETTLED_RAD:
                 break
@@ -111,9 +110,14 @@ class Opening:
             return again
         return self._run(Compensated(), None)
 
-    def _run(self, clock: SweepClock, twist: NDArray[np.float64] | None) -> list[RegisteredFrame]:
-        self._passage.begin(clock, twist)
-        return [self._passage.place(index, frame) for index, frame in self._frames]
+    def _run(
+        self,
+        clock: SweepClock,
+        twist: NDArray[np.float64] | None,
+        hoped: float | None = None,
+    ) -> list[RegisteredFrame]:
+        self._passage.begin(clock, twist, hoped)
+        return [self._passage.place(scan) for scan in self._scans]
 
     def _freed(self, passed: list[RegisteredFrame]) -> list[RegisteredFrame]:
         """The first frames from the steady motion that sight lines prefer, if they do clearly."""
@@ -152,14 +156,14 @@ class Opening:
         self, clock: SweepClock, poses: list[rigid.Pose], axis: NDArray[np.float64]
     ) -> list[RegisteredFrame]:
         """The first frames at steady poses, from the first frame on, moved across an axis only."""
-        stamps = [frame.stamp for _, frame in self._frames]
+        stamps = [scan.raw.stamp for scan in self._scans]
         twist = rigid.logarithm(poses[1]) / self._passage.pace.steps(stamps[0], stamps[1])
         self._passage.begin(clock, twist)
-        passed = [self._passage.place(*self._frames[0])]
+        passed = [self._passage.place(self._scans[0])]
         first = passed[0].world_from_sensor
         rail = first[:3, :3] @ axis
-        for (index, raw), pose in zip(self._frames[1:], poses[1:], strict=True):
-            passed.append(self._passage.ride(index, raw, first @ pose, rail))
+        for scan, pose in zip(self._scans[1:], poses[1:], strict=True):
+            passed.append(self._passage.ride(scan, first @ pose, rail))
         return passed
 
     def _steady_motion(self, passed: list[RegisteredFrame]) -> SteadyMotion:

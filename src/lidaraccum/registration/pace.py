@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from itertools import pairwise
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,7 @@ class Pace:
     @property
     def interval_s(self) -> float:
         """The usual interval, seconds."""
-        return float(np.median(self._intervals)) if self._intervals else DEFAULT_INTERVAL_S
+        return median(self._intervals) if self._intervals else DEFAULT_INTERVAL_S
 
     def steps(self, earlier_s: float, later_s: float, frames: int = 1) -> float:
         """How many usual intervals lie between two stamps, ``frames`` apart.

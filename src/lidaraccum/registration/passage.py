@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lidaraccum.data.frame import BoolArray, Frame
+from lidaraccum.data.frame import Frame
 from lidaraccum.data.registered import RegisteredFrame
 from lidaraccum.errors import InputError
 from lidaraccum.geometry import rigid
@@ -16,7 +16,7 @@ from lidaraccum.registration.azimuth_time import Glimpse
 from lidaraccum.registration.deskew import Compensated, SweepClock
 from lidaraccum.registration.locate import Hypothesis
 from lidaraccum.registration.pace import Pace
-from lidaraccum.registration.scan import StaticMask, usable_points
+from lidaraccum.registration.scan import Scan
 from lidaraccum.registration.settings import RegistrationSettings
 from lidaraccum.registration.sweep import SweepDetector
 from lidaraccum.registration.tracker import Tracker
@@ -46,30 +46,36 @@ class Passage:
         self,
         settings: RegistrationSettings,
         given: NDArray[np.float64] | None,
-        static_mask: StaticMask | None,
     ) -> None:
         self.settings = settings
         self.given = given
         self.pace = Pace()
         self.tracker = Tracker(settings, self.pace, Compensated())
-        self._static_mask = static_mask
         self._detector = SweepDetector(settings)
         self._recent: deque[tuple[Frame, Glimpse]] = deque(maxlen=WINDOW)
         self._last: tuple[int, rigid.Pose] | None = None
         self._stamp: float | None = None
         self._clock_is_new = False
 
-    def begin(self, clock: SweepClock, twist: NDArray[np.float64] | None) -> None:
-        """Start with an empty map, from a motion (6,) over one frame interval or from none."""
-        self.tracker = Tracker(self.settings, self.pace, clock, twist)
+    def begin(
+        self,
+        clock: SweepClock,
+        twist: NDArray[np.float64] | None,
+        hoped: float | None = None,
+    ) -> None:
+        """Start with an empty map, from a motion (6,) over one frame interval or from none.
+
+        Where the second frame, so started, reaches most of a hoped score, no other motion is tried.
+        """
+        self.tracker = Tracker(self.settings, self.pace, clock, twist, hoped)
         self._last = self._stamp = None
         self._recent.clear()
 
-    def follow(self, index: int, raw: Frame) -> RegisteredFrame:
+    def follow(self, scan: Scan) -> RegisteredFrame:
         """Register the next frame of the stream and add it to the map."""
         if self._stamp is not None:
-            self.pace.see(self._stamp, raw.stamp)
-        registered = self.place(index, raw)
+            self.pace.see(self._stamp, scan.raw.stamp)
+        registered = self.place(scan)
         if self._clock_is_new:
             quality = registered.quality
             doubts = (*quality.doubts, LATE_CLOCK)
@@ -83,31 +89,27 @@ class Passage:
                 self._clock_is_new = self._is_fast()
         return registered
 
-    def place(self, index: int, raw: Frame) -> RegisteredFrame:
+    def place(self, scan: Scan) -> RegisteredFrame:
         """Put a frame on the map, the first one after `begin` where it says the map begins."""
-        usable = usable_points(raw, self.settings, self._static_mask)
-        pose = None if self.given is None else self._given_pose(index)
+        pose = None if self.given is None else self._given_pose(scan.index)
         if self._last is None:
-            registered = self.tracker.start(index, raw, usable, np.eye(4) if pose is None else pose)
+            registered = self.tracker.start(scan, np.eye(4) if pose is None else pose)
         elif pose is None:
-            registered = self.tracker.follow(index, raw, usable)
+            registered = self.tracker.follow(scan)
         elif self.settings.poses_mode == "given":
-            registered = self.tracker.hold(index, raw, usable, pose)
+            registered = self.tracker.hold(scan, pose)
         else:
             before, world_from_before = self._last
             step = rigid.invert(self._given_pose(before)) @ pose
             hints = (Hypothesis("given", world_from_before @ step), Hypothesis("given", pose))
-            registered = self.tracker.follow(index, raw, usable, hints)
-        self._note(index, raw, usable, registered)
+            registered = self.tracker.follow(scan, hints)
+        self._note(scan, registered)
         return registered
 
-    def ride(
-        self, index: int, raw: Frame, pose: rigid.Pose, rail: NDArray[np.float64]
-    ) -> RegisteredFrame:
+    def ride(self, scan: Scan, pose: rigid.Pose, rail: NDArray[np.float64]) -> RegisteredFrame:
         """Put a frame at a pose, moved across a rail (3,), world, only."""
-        usable = usable_points(raw, self.settings, self._static_mask)
-        registered = self.tracker.ride(index, raw, usable, pose, rail)
-        self._note(index, raw, usable, registered)
+        registered = self.tracker.ride(scan, pose, rail)
+        self._note(scan, registered)
         return registered
 
     def look_at_sweep(self, *, anew: bool = False) -> SweepClock | None:
@@ -129,12 +131,12 @@ class Passage:
         twist = self.tracker.twist
         return twist is not None and bool(np.linalg.norm(twist[3:]) > LATE_MOTION_M)
 
-    def _note(self, index: int, raw: Frame, usable: BoolArray, registered: RegisteredFrame) -> None:
-        self._last = index, registered.world_from_sensor
-        self._stamp = raw.stamp
+    def _note(self, scan: Scan, registered: RegisteredFrame) -> None:
+        self._last = scan.index, registered.world_from_sensor
+        self._stamp = scan.raw.stamp
         if not self._detector.done:
-            points = raw.points[usable].astype(np.float64)
-            self._recent.append((raw, Glimpse(points, registered.world_from_sensor, np.zeros(6))))
+            few, pose = scan.source(np.zeros(6)), registered.world_from_sensor
+            self._recent.append((scan.raw, Glimpse(scan.usable_points, few, pose, np.zeros(6))))
 
     def _given_pose(self, index: int) -> rigid.Pose:
         assert self.given is not None

@@ -81,10 +81,10 @@ def _turn(axis: int, angle: float) -> rigid.Pose:
 
 def _picture(points: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
     """Columns (256, 256) with something upright in them; far ones wrap around."""
-    cells = np.unique(voxel.voxel_cells(voxel.voxel_keys(points, CELL_M)), axis=0)
-    plane = np.delete(cells, axis, axis=1)
-    flat = (plane[:, 0] % CELLS) * CELLS + plane[:, 1] % CELLS
-    storeys = np.bincount(flat, minlength=CELLS * CELLS).astype(np.float64)
+    cells = voxel.voxel_cells(np.unique(voxel.voxel_keys(points, CELL_M)))
+    row, column = (cells[:, other] for other in range(3) if other != axis)
+    flat = (row % CELLS) * CELLS + column % CELLS
+    storeys = np.bincount(flat, minlength=CELLS * CELLS).astype(np.float32)
     storeys[storeys < MIN_STOREYS] = 0.0
     return np.sqrt(np.minimum(storeys, 9.0)).reshape(CELLS, CELLS)
 

@@ -30,22 +30,30 @@ ADRIFT = "nothing in view fixes the motion in one direction"
 
 
 class Judge:
-    """Knows how well frames of this sequence usually fit."""
+    """Knows how well frames of this sequence usually fit.
 
-    def __init__(self, settings: RegistrationSettings) -> None:
+    Attributes:
+        first: Score of the first frame judged, if there was no doubt about it; else None.
+    """
+
+    def __init__(self, settings: RegistrationSettings, hoped: float | None = None) -> None:
+        """Begin with nothing judged; ``hoped``: the score that the first frame is able to reach."""
         self._settings = settings
+        self._hoped = hoped
         self._usual: float | None = None
+        self.first: float | None = None
 
     def forget(self) -> None:
         """Begin anew: the map did."""
-        self._usual = None
+        self._usual = self._hoped = None
 
     def trusts(self, located: Located) -> bool:
         """Whether this answer is good enough to look for no other."""
         alignment = located.alignment
-        if self._usual is None or alignment.overlap < self._settings.min_overlap:
+        usual = self._hoped if self._usual is None else self._usual
+        if usual is None or alignment.overlap < self._settings.min_overlap:
             return False
-        return alignment.score >= TRUSTED_SHARE * self._usual
+        return alignment.score >= TRUSTED_SHARE * usual
 
     def is_lost(self, located: Located, *, is_smooth: bool) -> bool:
         """Whether the best answer is none: it hardly fits, or fits badly and far from expected."""
@@ -58,6 +66,8 @@ class Judge:
         """Put the answer's worth into words, and learn from it."""
         alignment = located.alignment
         doubts = self._doubts(located, speed_mps)
+        if self._usual is None and not doubts:
+            self.first = alignment.score
         if not doubts or self._usual is None:
             usual = alignment.score if self._usual is None else self._usual
             memory = MEMORY_OF_BETTER if alignment.score > usual else MEMORY_OF_WORSE

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.data.frame import BoolArray, Frame
 from lidaraccum.geometry import voxel
+from lidaraccum.geometry.order import middle
 from lidaraccum.registration.deskew import SweepClock, deskewed, transform_along
+from lidaraccum.registration.pace import DEFAULT_INTERVAL_S
 from lidaraccum.registration.settings import RegistrationSettings
 
 StaticMask = Callable[[Frame], BoolArray]
@@ -38,12 +41,17 @@ class Scan:
     raw: Frame
     usable: BoolArray
     rows: NDArray[np.int64]
-    fractions: NDArray[np.float64] | None
-    interval_s: float
+    fractions: NDArray[Any] | None = None
+    interval_s: float = DEFAULT_INTERVAL_S
+
+    def timed(self, clock: SweepClock, interval_s: float) -> Scan:
+        """The same with the time of each point, as a clock tells it."""
+        fractions = clock.fractions(self.raw, interval_s)
+        return replace(self, fractions=fractions, interval_s=interval_s)
 
     def source(self, twist: NDArray[np.float64]) -> NDArray[np.float64]:
         """The chosen points (M, 3) at the stamp, had the sensor moved by ``twist`` (6,)."""
-        points = self.raw.points[self.rows].astype(np.float64)
+        points = self.raw.points.take(self.rows, axis=0).astype(np.float64)
         if self.fractions is None:
             return points
         return transform_along(twist, self.fractions[self.rows], points)
@@ -53,6 +61,11 @@ class Scan:
         if self.fractions is None:
             return self.raw
         return deskewed(self.raw, twist, self.fractions)
+
+    @property
+    def usable_points(self) -> NDArray[np.float32]:
+        """(K, 3) points that registration may use, as measured."""
+        return self.raw.points.take(np.flatnonzero(self.usable), axis=0)
 
     @property
     def bends(self) -> bool:
@@ -66,13 +79,23 @@ class Scan:
         Times in the file hold also where the sensor's motion was undone before.
         """
         if self.fractions is not None:
-            return (self.fractions * self.interval_s).astype(np.float32)
+            return (self.fractions * self.interval_s).astype(np.float32, copy=False)
         if self.raw.time_offset is not None:
             return self.raw.time_offset.astype(np.float32)
         return None
 
 
-def usable_points(
+def prepare(
+    index: int, raw: Frame, settings: RegistrationSettings, static_mask: StaticMask | None
+) -> Scan:
+    """Choose which of a frame's points registration may use, and which of them it aligns."""
+    usable = _usable_points(raw, settings, static_mask)
+    candidates = np.flatnonzero(usable)
+    thin = voxel.thin(raw.points.take(candidates, axis=0), settings.source_voxel_m)
+    return Scan(index, raw, usable, candidates[thin])
+
+
+def _usable_points(
     frame: Frame, settings: RegistrationSettings, static_mask: StaticMask | None
 ) -> BoolArray:
     """Points (N,) that came back, are neither the carrying car nor far off, and stand still."""
@@ -80,27 +103,9 @@ def usable_points(
     if not frame.origin.any():
         distance = frame.ranges
         if usable.any():
-            near = INDOOR_SHARE * float(np.median(distance[usable]))
+            near = INDOOR_SHARE * middle(distance.compress(usable))
             usable &= distance >= min(settings.min_range_m, near)
         usable &= distance <= settings.max_range_m
     if static_mask is not None:
         usable &= static_mask(frame)
     return usable
-
-
-def prepare(
-    index: int, raw: Frame, usable: BoolArray, clock: SweepClock, sizes: tuple[float, float]
-) -> Scan:
-    """Choose a frame's source points and find out when each point was measured.
-
-    Args:
-        index: Place of the frame in the sequence.
-        raw: The frame as read.
-        usable: (N,) from `usable_points`.
-        clock: How time runs within a sweep.
-        sizes: Seconds of a frame interval; metres of the voxels that give one source point each.
-    """
-    interval_s, source_voxel_m = sizes
-    candidates = np.flatnonzero(usable)
-    rows = candidates[voxel.thin(raw.points[candidates], source_voxel_m)]
-    return Scan(index, raw, usable, rows, clock.fractions(raw, interval_s), interval_s)

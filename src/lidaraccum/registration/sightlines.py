@@ -63,9 +63,9 @@ class Sightlines:
         np.maximum.at(farthest, pixel, ranges)
         shape = (ROWS, self._columns)
         near, far, known = _between_beams(nearest.reshape(shape), farthest.reshape(shape))
-        enough = np.add.reduce(_beside(known.astype(np.int8))) >= MIN_COLUMNS
-        self._near = np.where(enough, np.minimum.reduce(_beside(near)), np.nan).ravel()
-        self._far = np.where(enough, np.maximum.reduce(_beside(far)), np.nan).ravel()
+        enough = _with_beside(np.add, known.astype(np.int8)) >= MIN_COLUMNS
+        self._near = np.where(enough, _with_beside(np.minimum, near), np.nan).ravel()
+        self._far = np.where(enough, _with_beside(np.maximum, far), np.nan).ravel()
 
     def agreement(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """How well places (N, 3), the frame's coordinates, fit what it saw: (N,) 0..1 or NaN."""
@@ -84,7 +84,8 @@ class Sightlines:
 
     def _column(self, azimuth: NDArray[np.float64]) -> NDArray[np.int64]:
         turns = azimuth / (2 * np.pi) + 0.5
-        return np.asarray((turns * self._columns).astype(np.int64) % self._columns)
+        column = (turns * self._columns).astype(np.int64)
+        return np.where(column == self._columns, 0, column)
 
 
 class Eye:
@@ -134,11 +135,28 @@ class Sight:
         """What it saw."""
         return Sightlines(self.points, self.eye.place(self.points))
 
-    def agreement(self, other: Sight, own_from_other: rigid.Pose) -> NDArray[np.float64]:
-        """How well another frame's points fit this one's sight, and the other way around."""
-        there = self.lines.agreement(rigid.transform(own_from_other, other.few))
-        back = other.lines.agreement(rigid.transform(rigid.invert(own_from_other), self.few))
-        return np.concatenate([there, back])
+    def agreement(self, other: Sight, own_from_others: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How well another frame's points fit this one's sight, and the other way around.
+
+        Args:
+            other: The other frame.
+            own_from_others: (L, 4, 4) poses that it may have.
+
+        Returns:
+            (L, K) for each pose and point.
+        """
+        there = self._agreement_at(own_from_others, other.few)
+        back = other._agreement_at(rigid.invert(own_from_others), self.few)
+        return np.concatenate([there, back], axis=1)
+
+    def _agreement_at(
+        self, own_from_others: NDArray[np.float64], few: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """How well points (K, 3), seen from each of many poses (L, 4, 4), fit the sight: (L, K)."""
+        columns = np.ascontiguousarray(few.T)
+        places = np.einsum("lij,jk->ilk", own_from_others[:, :3, :3], columns)
+        places += own_from_others[:, :3, 3].T[:, :, None]
+        return self.lines.agreement(places.reshape(3, -1).T).reshape(len(own_from_others), -1)
 
 
 def gain(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
@@ -150,13 +168,18 @@ def gain(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
 def _fitting_columns(azimuth: NDArray[np.float64]) -> int:
     turns = azimuth / (2 * np.pi) + 0.5
     columns = FINEST_COLUMNS
-    filled = len(np.unique((turns * columns).astype(np.int64)))
+    filled = _filled(turns, columns)
     while columns > COARSEST_COLUMNS:
-        fewer = len(np.unique((turns * (columns // 2)).astype(np.int64)))
+        fewer = _filled(turns, columns // 2)
         if 2 * fewer < FULL_RATIO * filled:
             break
         columns, filled = columns // 2, fewer
     return columns
+
+
+def _filled(turns: NDArray[np.float64], columns: int) -> int:
+    """How many of so many columns the azimuths (N,), in turns, fall into."""
+    return int(np.count_nonzero(np.bincount((turns * columns).astype(np.int64))))
 
 
 def _between_beams(
@@ -164,20 +187,24 @@ def _between_beams(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], BoolArray]:
     """Range bounds (R, C) of each pixel with the next beams below and above; where both are."""
     met = np.isfinite(nearest)
-    row = np.arange(ROWS)[:, None]
+    row = np.arange(ROWS, dtype=np.int32)[:, None]
     below = np.maximum.accumulate(np.where(met, row, -1))
     above = np.minimum.accumulate(np.where(met, row, ROWS)[::-1])[::-1]
-    nothing = np.full((1, met.shape[1]), -1)
+    nothing = np.full((1, met.shape[1]), -1, dtype=np.int32)
     below = np.concatenate([nothing, below[:-1]])
-    above = np.concatenate([above[1:], nothing + ROWS + 1])
+    above = np.concatenate([above[1:], nothing + (ROWS + 1)])
     known = (below >= 0) & (above < ROWS) & (above - below <= WIDEST_GAP_ROWS)
-    below, above = np.maximum(below, 0), np.minimum(above, ROWS - 1)
-    column = np.arange(met.shape[1])[None, :]
-    near = np.minimum(nearest, np.minimum(nearest[below, column], nearest[above, column]))
-    far = np.maximum(farthest, np.maximum(farthest[below, column], farthest[above, column]))
-    return np.where(known, near, np.inf), np.where(known, far, -np.inf), known
+    at = np.flatnonzero(known)
+    columns, column = met.shape[1], at % met.shape[1]
+    low, high = below.ravel()[at] * columns + column, above.ravel()[at] * columns + column
+    near, far = np.full(met.shape, np.inf), np.full(met.shape, -np.inf)
+    for bound, image, wider in ((near, nearest, np.minimum), (far, farthest, np.maximum)):
+        flat = image.ravel()
+        bound.ravel()[at] = wider(flat[at], wider(flat[low], flat[high]))
+    return near, far, known
 
 
-def _beside(image: NDArray[Any]) -> list[NDArray[Any]]:
-    """The image (R, C), closed round the sensor, with the columns left and right of each."""
-    return [np.roll(image, shift, axis=1) for shift in (-1, 0, 1)]
+def _with_beside(combine: np.ufunc, image: NDArray[Any]) -> NDArray[Any]:
+    """The image (R, C), closed round the sensor, each pixel with those left and right of it."""
+    both = combine(np.roll(image, -1, axis=1), np.roll(image, 1, axis=1))
+    return np.asarray(combine(image, both))

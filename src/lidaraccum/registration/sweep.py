@@ -83,9 +83,9 @@ class SweepDetector:
     def _align(self, glimpses: Sequence[Glimpse]) -> None:
         last = len(glimpses) - 1
         half = last // 2
-        pairs = {(0, half), (half, last), (0, last)} if half > 0 else {(0, last)}
-        for target, source in sorted(pairs):
-            self._azimuth_time.add(glimpses[target], glimpses[source])
+        self._azimuth_time.add(glimpses[0], [glimpses[at] for at in sorted({half, last} - {0})])
+        if half > 0:
+            self._azimuth_time.add(glimpses[half], [glimpses[last]])
 
     def _seam(self, points: NDArray[np.float32]) -> Seam | None:
         """The file's order where aligned frames agree with it; else what they say, if clear.

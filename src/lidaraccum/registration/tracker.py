@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lidaraccum.data.frame import BoolArray, Frame
+from lidaraccum.data.frame import Frame
 from lidaraccum.data.registered import RegisteredFrame, RegistrationQuality
 from lidaraccum.geometry import rigid
 from lidaraccum.registration.along import open_axis
@@ -17,7 +17,7 @@ from lidaraccum.registration.locate import Hypothesis, Located, proposed, refine
 from lidaraccum.registration.pace import Pace
 from lidaraccum.registration.proposals import Reach
 from lidaraccum.registration.quality import Judge
-from lidaraccum.registration.scan import Scan, prepare
+from lidaraccum.registration.scan import Scan
 from lidaraccum.registration.settings import RegistrationSettings
 from lidaraccum.registration.sightlines import Eye, Sight
 from lidaraccum.registration.surface_map import SurfaceMap
@@ -76,6 +76,7 @@ class Tracker:
         pace: Pace,
         clock: SweepClock,
         twist: NDArray[np.float64] | None = None,
+        hoped: float | None = None,
     ) -> None:
         """Begin with an empty map.
 
@@ -84,13 +85,14 @@ class Tracker:
             pace: Shared with whoever sees the stamps.
             clock: How time runs within a sweep; may be replaced later.
             twist: (6,) motion over one frame interval at the first frame, or None: unknown.
+            hoped: Score that the second frame reached in this motion before, or None.
         """
         self.clock = clock
         self.twist = twist
         self._settings = settings
         self._pace = pace
         self._surface = SurfaceMap(settings.voxel_m, settings.max_range_m * 1.1)
-        self._judge = Judge(settings)
+        self.judge = Judge(settings, hoped)
         self._last: Fix | None = None
         self._first_origin = np.zeros(3)
         self._lost = 0
@@ -103,22 +105,21 @@ class Tracker:
         self.sights.clear()
         self.open_axes.clear()
 
-    def start(self, index: int, raw: Frame, usable: BoolArray, pose: rigid.Pose) -> RegisteredFrame:
+    def start(self, scan: Scan, pose: rigid.Pose) -> RegisteredFrame:
         """Put the first frame on the empty map."""
-        self._first_origin = raw.origin
-        scan = self._prepare(index, raw, usable)
+        self._first_origin = scan.raw.origin
+        scan = self._timed(scan)
         twist = np.zeros(6) if self.twist is None else self.twist
         quality = RegistrationQuality("first", overlap=1.0, residual_m=0.0)
         return self._remember(scan, twist, pose, quality)
 
-    def hold(self, index: int, raw: Frame, usable: BoolArray, pose: rigid.Pose) -> RegisteredFrame:
+    def hold(self, scan: Scan, pose: rigid.Pose) -> RegisteredFrame:
         """Take a given pose as it is; only measure how well the map speaks for it."""
-        steps = self._steps_to(index, raw)
+        scan, steps = self._timed(scan), self._steps_to(scan)
         self.twist = self._twist_to(pose, steps)
-        scan = self._prepare(index, raw, usable)
         source = scan.source(self.twist)
         located = Located("given", assess(self._surface, source, pose))
-        quality = self._judge.judge(located, self._speed(pose, steps))
+        quality = self.judge.judge(located, self._speed(pose, steps))
         rival = refine(self._surface, source, Hypothesis("given", pose)).alignment
         away_m = float(np.linalg.norm(rival.world_from_sensor[:3, 3] - pose[:3, 3]))
         if away_m > CONTRADICTION_M and rival.score > CONTRADICTION_SHARE * located.alignment.score:
@@ -126,38 +127,21 @@ class Tracker:
             quality = replace(quality, doubts=(*quality.doubts, contradiction))
         return self._remember(scan, self.twist, pose, quality)
 
-    def ride(
-        self,
-        index: int,
-        raw: Frame,
-        usable: BoolArray,
-        pose: rigid.Pose,
-        rail: NDArray[np.float64],
-    ) -> RegisteredFrame:
+    def ride(self, scan: Scan, pose: rigid.Pose, rail: NDArray[np.float64]) -> RegisteredFrame:
         """Put a frame at a pose, as planes have it but for its place along a rail (3,), world."""
-        steps = self._steps_to(index, raw)
-        scan = self._prepare(index, raw, usable)
+        scan, steps = self._timed(scan), self._steps_to(scan)
         source = scan.source(self._twist_to(pose, steps))
         placed = align(self._surface, source, pose, rail=rail)
         located = Located("steady", assess(self._surface, source, placed), sighted=True)
         self.open_axes.append(rail)
         self.twist = self._twist_to(placed, steps)
-        quality = self._judge.judge(located, self._speed(placed, steps))
+        quality = self.judge.judge(located, self._speed(placed, steps))
         return self._remember(scan, self.twist, placed, quality)
 
-    def follow(
-        self, index: int, raw: Frame, usable: BoolArray, hints: tuple[Hypothesis, ...] = ()
-    ) -> RegisteredFrame:
-        """Find the next frame's pose.
-
-        Args:
-            index: Place of the frame in the sequence.
-            raw: The frame as read.
-            usable: (N,) points that may be used.
-            hints: Poses from elsewhere, believed before constant velocity.
-        """
-        scan = self._prepare(index, raw, usable)
-        expectation = self._expect(index, raw, hints)
+    def follow(self, scan: Scan, hints: tuple[Hypothesis, ...] = ()) -> RegisteredFrame:
+        """Find the next frame's pose; hints are believed before constant velocity."""
+        scan = self._timed(scan)
+        expectation = self._expect(scan, hints)
         twist = self._twist_to(expectation.starts[0].world_from_sensor, expectation.steps)
         located = self._locate(scan.source(twist), expectation)
         for _ in range(MAX_PASSES - 1):
@@ -170,13 +154,13 @@ class Tracker:
         self._look_along(scan, located, expectation.steps)
         return self._conclude(scan, located, expectation)
 
-    def _expect(self, index: int, raw: Frame, hints: tuple[Hypothesis, ...]) -> Expectation:
+    def _expect(self, scan: Scan, hints: tuple[Hypothesis, ...]) -> Expectation:
         assert self._last is not None
-        steps = self._steps_to(index, raw)
+        steps = self._steps_to(scan)
         last = self._last.world_from_sensor
         starts = list(hints)
-        if raw.origin.any():
-            aligned = rigid.translation(raw.origin - self._first_origin)
+        if scan.raw.origin.any():
+            aligned = rigid.translation(scan.raw.origin - self._first_origin)
             starts.append(Hypothesis("aligned", aligned))
         known = self.twist is not None or bool(starts)
         if self.twist is not None:
@@ -190,7 +174,7 @@ class Tracker:
         first, found = expectation.starts[0], None
         if expectation.known:
             found = refine(self._surface, source, first)
-            if self._judge.trusts(found) and self._is_smooth(found, first, expectation.steps):
+            if self.judge.trusts(found) and self._is_smooth(found, first, expectation.steps):
                 return found
         interval_s = expectation.steps * self._pace.interval_s
         reach = Reach(
@@ -225,8 +209,8 @@ class Tracker:
         pose = located.alignment.world_from_sensor
         first = expectation.starts[0]
         is_smooth = not expectation.known or self._is_smooth(located, first, expectation.steps)
-        lost = self._judge.is_lost(located, is_smooth=is_smooth)
-        quality = self._judge.judge(located, self._speed(pose, expectation.steps))
+        lost = self.judge.is_lost(located, is_smooth=is_smooth)
+        quality = self.judge.judge(located, self._speed(pose, expectation.steps))
         self._lost = self._lost + 1 if lost else 0
         if lost:
             pose, quality = first.world_from_sensor, replace(quality, hypothesis=first.name)
@@ -236,7 +220,7 @@ class Tracker:
         elif self._lost <= PATIENCE:
             return self._registered(scan, scan.straightened(twist), pose, quality)
         else:
-            self._judge.forget()
+            self.judge.forget()
         return self._remember(scan, twist, pose, quality)
 
     def _remember(
@@ -247,8 +231,8 @@ class Tracker:
         quality: RegistrationQuality,
     ) -> RegisteredFrame:
         frame = scan.straightened(twist)
-        self._surface.insert(rigid.transform(pose, frame.points[scan.usable]), scan.index)
-        self._surface.forget_far(pose[:3, 3], scan.index)
+        usable = frame.points.take(np.flatnonzero(scan.usable), axis=0)
+        self._surface.insert(usable, scan.index, pose)
         self._last = Fix(scan.index, frame.stamp, pose)
         return self._registered(scan, frame, pose, quality)
 
@@ -267,14 +251,13 @@ class Tracker:
             seconds_from_stamp=seconds,
         )
 
-    def _prepare(self, index: int, raw: Frame, usable: BoolArray) -> Scan:
-        sizes = (self._pace.interval_s, self._settings.source_voxel_m)
-        return prepare(index, raw, usable, self.clock, sizes)
+    def _timed(self, scan: Scan) -> Scan:
+        return scan.timed(self.clock, self._pace.interval_s)
 
-    def _steps_to(self, index: int, raw: Frame) -> float:
+    def _steps_to(self, scan: Scan) -> float:
         assert self._last is not None
-        missed = index - self._last.index
-        return self._pace.steps(self._last.stamp, raw.stamp, missed)
+        missed = scan.index - self._last.index
+        return self._pace.steps(self._last.stamp, scan.raw.stamp, missed)
 
     def _twist_to(self, pose: rigid.Pose, steps: float) -> NDArray[np.float64]:
         assert self._last is not None
