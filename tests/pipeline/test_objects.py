@@ -13,7 +13,7 @@ from lidaraccum.data.registered import RegisteredFrame, RegistrationQuality
 from lidaraccum.geometry import rigid
 from lidaraccum.pipeline.courses import course
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.landing import land
+from lidaraccum.pipeline.landing import Lineup
 from lidaraccum.pipeline.motion_settings import BALANCED
 from lidaraccum.pipeline.search import find_objects
 from lidaraccum.pipeline.suspects import Template, make_template
@@ -190,11 +190,11 @@ def test_what_moves_is_met_when_the_sweep_comes_by() -> None:
     velocity = np.array([15.0, 0.0, 0.0])
     ahead = np.array([[0.0, 8.0, 0.0]])  # a quarter turn after the stamp: 0.025 s
     template = Template(ahead, np.zeros(1), 0.1, np.array([-0.01]), ahead[0])
-    met = land(template, velocity[None], np.zeros(1), frame)[:, 0].T
+    met = Lineup([frame]).land(template, velocity[None], np.zeros(1))[:, 0, 0].T
     np.testing.assert_allclose(met, ahead + velocity * (0.025 + 0.01), atol=0.03)
     untimed = SightedFrame(replace(swept, seconds_from_stamp=None), BALANCED)
     timeless = replace(template, seconds=np.zeros(1))
-    met = land(timeless, velocity[None], np.zeros(1), untimed)[:, 0].T
+    met = Lineup([untimed]).land(timeless, velocity[None], np.zeros(1))[:, 0, 0].T
     np.testing.assert_array_equal(met, ahead)
     picked = np.arange(len(frame.rows))
     at_stamp = frame.world_at_stamp(picked, velocity)

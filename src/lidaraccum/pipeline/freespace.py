@@ -141,12 +141,7 @@ class SightedFrame:
             heights: (N,) metres above the ground: hills do not part what is one thing.
         """
         x, y = points[:, 0], points[:, 1]
-        return np.column_stack([x, y, self.height_weight(x, y) * heights])
-
-    def height_weight(self, x: NDArray[Any], y: NDArray[Any]) -> NDArray[np.float64]:
-        """What heights count in distances, (...) each, at x and y (...), sensor coordinates."""
-        spacing = self.gap * np.sqrt(x * x + y * y)
-        return np.minimum(HEIGHT_WEIGHT, BEAM_ALLOWANCE_M / np.maximum(spacing, 1e-3))
+        return np.column_stack([x, y, height_weight(x, y, self.gap) * heights])
 
     def world(self, picked: NDArray[np.int64]) -> NDArray[np.float64]:
         """Some of the obstacles (K,) in the world, (K, 3) metres."""
@@ -175,7 +170,7 @@ class SightedFrame:
 
     def seconds_toward(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
         """As `seconds_at` where `is_timed`, for x and y (...) each: (...) seconds."""
-        return self._seconds_by_azimuth[_azimuth_bins(x - self.viewpoint[0], y - self.viewpoint[1])]
+        return self.seconds_by_azimuth[azimuth_bins(x - self.viewpoint[0], y - self.viewpoint[1])]
 
     @cached_property
     def is_timed(self) -> bool:
@@ -183,9 +178,10 @@ class SightedFrame:
         return bool(self.seconds.any())
 
     @cached_property
-    def _seconds_by_azimuth(self) -> NDArray[np.float64]:
+    def seconds_by_azimuth(self) -> NDArray[np.float64]:
+        """(`AZIMUTH_BINS`,) seconds after the stamp at which the sweep passed each direction."""
         x, y = self.level
-        bins = _azimuth_bins(x - self.viewpoint[0], y - self.viewpoint[1])
+        bins = azimuth_bins(x - self.viewpoint[0], y - self.viewpoint[1])
         counts = np.bincount(bins, minlength=AZIMUTH_BINS)
         sums = np.bincount(bins, self.seconds, minlength=AZIMUTH_BINS)
         full = np.flatnonzero(counts)
@@ -222,7 +218,19 @@ class SightedFrame:
         other.met += sighting.met
 
 
-def _azimuth_bins(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
+def height_weight(
+    x: NDArray[Any], y: NDArray[Any], gap: float | NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """What heights count in distances, (...) each, at x and y (...) from sensors.
+
+    ``gap`` is the angle between their beams, radians, (...) or one for all.
+    """
+    spacing = gap * np.sqrt(x * x + y * y)
+    return np.minimum(HEIGHT_WEIGHT, BEAM_ALLOWANCE_M / np.maximum(spacing, 1e-3))
+
+
+def azimuth_bins(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Which of `AZIMUTH_BINS` directions, all round, each of x and y (...) lies in."""
     angle = np.arctan2(y.astype(np.float32), x.astype(np.float32))
     bins = (angle * np.float32(AZIMUTH_BINS / (2 * np.pi))).astype(np.int64)
     bins[bins < 0] += AZIMUTH_BINS
