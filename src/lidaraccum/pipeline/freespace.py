@@ -57,7 +57,7 @@ class SightedFrame:
         settings: MotionSettings,
         viewpoint: NDArray[np.float64] | None = None,
     ) -> None:
-        points = registered.frame.points
+        points = np.asfortranarray(registered.frame.points)  # all looks go column by column
         if np.abs(points).max(initial=0.0) > FARTHEST_ECHO_M:
             # What no sensor can have seen counts as no return: it would stretch every grid.
             beyond = np.abs(points).max(axis=1) > FARTHEST_ECHO_M
@@ -80,12 +80,12 @@ class SightedFrame:
         self.close_rows = np.flatnonzero(
             ~outside & low_enough & obstacle & (squared > MIN_RANGE_M**2)
         )
-        self.close_points = points[self.close_rows].astype(np.float64)
+        self.close_points = _picked(points, self.close_rows)
         near = np.concatenate([self.rows, self.low_rows])
-        self.near_points = points[near].astype(np.float64)
-        self.near_heights = heights[near]
+        self.near_points = _picked(points, near)
+        self.near_heights = heights.take(near)
         seconds = registered.seconds_within_sweep
-        self.seconds = np.zeros(len(self.rows)) if seconds is None else seconds[self.rows]
+        self.seconds = np.zeros(len(self.rows)) if seconds is None else seconds.take(self.rows)
         self.segments = connected_cells(self.points, settings.cell_m)
         self.segment_sizes = np.bincount(self.segments)
         self.through = np.zeros(len(self.rows), dtype=np.int16)
@@ -123,9 +123,13 @@ class SightedFrame:
 
     @cached_property
     def tree(self) -> cKDTree:
-        """Obstacles and low points by `places`."""
-        places = self.places(self.near_points, self.near_heights)
-        return cKDTree(places, balanced_tree=False, compact_nodes=False)
+        """Obstacles and low points by their places."""
+        return cKDTree(self.near_places, balanced_tree=False, compact_nodes=False)
+
+    @cached_property
+    def near_places(self) -> NDArray[np.float64]:
+        """The `places` (M + L, 3) of obstacles and low points."""
+        return self.places(self.near_points, self.near_heights)
 
     @cached_property
     def level(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -216,6 +220,11 @@ class SightedFrame:
         sighting = self.view.look(other._columns, sensor_from_other)
         other.through += sighting.through
         other.met += sighting.met
+
+
+def _picked(points: NDArray[np.float32], rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Some of the points (N, 3), laid out column by column, row by row (K, 3)."""
+    return np.ascontiguousarray(points.T.take(rows, axis=1).T, dtype=np.float64)
 
 
 def height_weight(

@@ -96,11 +96,11 @@ def _lain_on(
     template = whole_template(own, picked)
     lineup = Lineup([frame for frame in frames if frame is not own])
     landed = lineup.land(template, velocity[None], np.array([turn]))[:, :, 0]
-    gathered = {}
+    gathered, range_m = {}, _mean_range(own.points[picked])
     for frame, local in zip(lineup.frames, landed.transpose(1, 2, 0), strict=True):
         places = frame.places(local, template.heights)
         found = _points_at(frame, places, whole_only=whole_only)
-        nearer = max(1.0, _mean_range(own.points[picked]) / max(_mean_range(local), 0.1))
+        nearer = max(1.0, range_m / max(_mean_range(local), 0.1))
         if 0 < len(found) < MOST_GROWTH * len(picked) * nearer**2:
             gathered[frame.index] = found
     return gathered
@@ -118,7 +118,7 @@ def _points_at(
     about = np.flatnonzero((x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]))
     if len(about) == 0:
         return about
-    own = frame.places(frame.points[about], frame.heights[about])
+    own = frame.near_places.take(about, axis=0)
     tree = cKDTree(places, balanced_tree=False, compact_nodes=False)
     distance, _ = tree.query(own, distance_upper_bound=JOIN_M)
     close = about[np.isfinite(distance)]

@@ -92,12 +92,12 @@ class Lineup:
         return distance, row
 
     def places_of(self, rows: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Near points (3, F, H, P) by their rows (F, H, P), sensor coordinates."""
-        found = [
-            frame.near_points.take(own, axis=0, mode="clip")
-            for frame, own in zip(self.frames, rows, strict=True)
-        ]
-        return np.stack(found).transpose(3, 0, 1, 2)
+        """Near points (3, F, H, P) by their rows (F, H, P), sensor coordinates; 0 without any."""
+        found = np.zeros((*rows.shape, 3))
+        for number, frame in enumerate(self.frames):
+            if len(frame.near_points):
+                found[number] = frame.near_points.take(rows[number], axis=0, mode="clip")
+        return found.transpose(3, 0, 1, 2)
 
     def in_world(self, shifts: NDArray[np.float64]) -> NDArray[np.float64]:
         """Shifts (3, F, H) in sensor coordinates, along the world's axes."""
