@@ -11,6 +11,7 @@ import numpy as np
 import torch
 
 from lidaraccum.model.batch import prepare, to_tensors
+from lidaraccum.model.bytes import in_bytes
 from lidaraccum.model.checkpoint import load_network
 from lidaraccum.model.motion import Windows
 from lidaraccum.model.network import presence_map, some_close_points
@@ -37,7 +38,7 @@ def timed(name: str, call: Callable[[], Answer], repeats: int = 5) -> Answer:
 def main() -> None:
     """A five-frame window of an HDL-64E on the 64 m grid."""
     torch.set_num_threads(int(sys.argv[1]) if len(sys.argv) > 1 else 2)
-    network = load_network(chosen_weights(None))
+    network = in_bytes(load_network(chosen_weights(None)))
     sequence = simulate(DriveSettings(seed=2, sensor="HDL-64E", rate_hz=10.0))
     frames = [sequence[index] for index in range(5)]
     print(f"bfloat16: {has_bfloat16('cpu')}; points: {[len(frame) for frame in frames]}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 
 from lidaraccum.model.kabsch import invert
-from lidaraccum.model.motion import Windows, moments, read, warp
+from lidaraccum.model.motion import moments, read, warp
 from lidaraccum.model.network import Network
 
 
@@ -27,12 +27,10 @@ def test_warped_features_lie_where_the_pose_puts_them() -> None:
     pose[:2, :2] = torch.stack([torch.stack([angle.cos(), -angle.sin()]),
                                 torch.stack([angle.sin(), angle.cos()])])  # fmt: skip
     pose[:2, 3] = torch.tensor([0.5, -0.3])
-    maps = [ramp(), ramp()]
-    poses = torch.stack([torch.eye(4), pose])
-    warped = list(warp(maps, poses, Windows.single(2), 4.0))
-    assert torch.equal(warped[0], maps[0])
+    warped, single = warp([ramp(), ramp()[:, :1]], pose, 4.0)
+    torch.testing.assert_close(single, warped[:, :1])
     xy = torch.tensor([[0.4, 0.2], [-1.0, 1.5]])
-    there = read(warped[1], xy, 4.0)
+    there = read(warped, xy, 4.0)
     back = invert(pose)
     torch.testing.assert_close(there, xy @ back[:2, :2].T + back[:2, 3], atol=1e-5, rtol=1e-5)
 
@@ -40,8 +38,7 @@ def test_warped_features_lie_where_the_pose_puts_them() -> None:
 def test_what_lies_beyond_the_grid_is_nothing() -> None:
     pose = torch.eye(4)
     pose[0, 3] = 2.0  # two metres ahead: a quarter of the grid
-    maps = [torch.ones(1, 3, 8, 8), torch.ones(1, 3, 8, 8)]
-    _, moved = warp(maps, torch.stack([torch.eye(4), pose]), Windows.single(2), 4.0)
+    (moved,) = warp([torch.ones(1, 3, 8, 8)], pose, 4.0)
     assert (moved[:, :, :2] == 0).all()
     torch.testing.assert_close(moved[:, :, 2:], torch.ones(1, 3, 6, 8))
 
@@ -50,7 +47,7 @@ def test_maps_read_and_warped_have_gradients() -> None:
     one = torch.rand(1, 3, 8, 8, requires_grad=True)
     pose = torch.eye(4)
     pose[:2, 3] = torch.tensor([0.3, -0.6])
-    _, moved = warp([one, one], torch.stack([torch.eye(4), pose]), Windows.single(2), 4.0)
+    (moved,) = warp([one], pose, 4.0)
     moved[0, :, 4, 4].sum().backward()
     assert one.grad is not None
     torch.testing.assert_close(one.grad.sum(), torch.tensor(3.0))

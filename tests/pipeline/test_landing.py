@@ -1,4 +1,4 @@
-"""All hypotheses at once land where each would alone."""
+"""All hypotheses at once land in all frames at once where each would alone."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from lidaraccum.data.registered import RegisteredFrame, RegistrationQuality
 from lidaraccum.geometry import rigid
 from lidaraccum.pipeline.courses import course
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.landing import land
+from lidaraccum.pipeline.landing import Lineup
 from lidaraccum.pipeline.motion_settings import BALANCED
 from lidaraccum.pipeline.suspects import Template
 
@@ -49,8 +49,9 @@ def test_hypotheses_land_as_each_alone(timed: bool, turns: tuple[float, ...]) ->
     world = rng.normal((6.0, 3.0, 0.0), 1.0, (20, 3))
     template = Template(world, world[:, 2], 0.0, rng.uniform(0, 0.05, 20), world.mean(axis=0))
     velocities = np.array([(0.0, 0.0, 0.0), (8.0, -2.0, 0.0), (-3.0, 5.0, 0.0)])
-    frame = frame_at(0.3, timed=timed)
-    landed = land(template, velocities, np.array(turns), frame)
-    for row, (velocity, turn) in enumerate(zip(velocities, turns, strict=True)):
-        alone = landed_alone(template, velocity, turn, frame)
-        np.testing.assert_allclose(landed[:, row].T, alone, atol=1e-9)
+    frames = [frame_at(0.3, timed=timed), frame_at(-0.2, timed=timed), frame_at(0.1, timed=False)]
+    landed = Lineup(frames).land(template, velocities, np.array(turns))
+    for place, frame in enumerate(frames):
+        for row, (velocity, turn) in enumerate(zip(velocities, turns, strict=True)):
+            alone = landed_alone(template, velocity, turn, frame)
+            np.testing.assert_allclose(landed[:, place, row].T, alone, atol=1e-9)

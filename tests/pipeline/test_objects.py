@@ -13,10 +13,10 @@ from lidaraccum.data.registered import RegisteredFrame, RegistrationQuality
 from lidaraccum.geometry import rigid
 from lidaraccum.pipeline.courses import course
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.landing import land
+from lidaraccum.pipeline.landing import Lineup
 from lidaraccum.pipeline.motion_settings import BALANCED
 from lidaraccum.pipeline.search import find_objects
-from lidaraccum.pipeline.suspects import Template, make_template
+from lidaraccum.pipeline.suspects import Template, template_of
 from lidaraccum.pipeline.verdict import (
     bend_course,
     judge,
@@ -44,7 +44,7 @@ def frames(busy_street: Any) -> list[SightedFrame]:
 @pytest.fixture
 def car(frames: list[SightedFrame], busy_street: Any) -> Template:
     picked = np.flatnonzero(busy_street.on[4][frames[4].rows] == 1)
-    return make_template(frames[4], picked, 80)
+    return template_of(frames[4], picked, 80)
 
 
 def test_the_true_motion_costs_least(frames: list[SightedFrame], car: Template) -> None:
@@ -84,7 +84,7 @@ def test_both_movers_are_found_with_their_motions(frames: list[SightedFrame]) ->
 
 def test_a_wall_slides_along_itself_but_stands(frames: list[SightedFrame]) -> None:
     wall = np.flatnonzero((frames[2].points[:, 1] > 8.5) & (np.abs(frames[2].points[:, 0]) < 8))
-    template = make_template(frames[2], wall, 80)
+    template = template_of(frames[2], wall, 80)
     along = np.array([[0.0, 0.0, 0.0], [6.0, 0.0, 0.0], [-3.0, 0.0, 0.0]])
     cost = judge(template, along, frames, BALANCED).cost
     assert (cost[0] < cost[1:] + BALANCED.margin).all()
@@ -190,11 +190,11 @@ def test_what_moves_is_met_when_the_sweep_comes_by() -> None:
     velocity = np.array([15.0, 0.0, 0.0])
     ahead = np.array([[0.0, 8.0, 0.0]])  # a quarter turn after the stamp: 0.025 s
     template = Template(ahead, np.zeros(1), 0.1, np.array([-0.01]), ahead[0])
-    met = land(template, velocity[None], np.zeros(1), frame)[:, 0].T
+    met = Lineup([frame]).land(template, velocity[None], np.zeros(1))[:, 0, 0].T
     np.testing.assert_allclose(met, ahead + velocity * (0.025 + 0.01), atol=0.03)
     untimed = SightedFrame(replace(swept, seconds_from_stamp=None), BALANCED)
     timeless = replace(template, seconds=np.zeros(1))
-    met = land(timeless, velocity[None], np.zeros(1), untimed)[:, 0].T
+    met = Lineup([untimed]).land(timeless, velocity[None], np.zeros(1))[:, 0, 0].T
     np.testing.assert_array_equal(met, ahead)
     picked = np.arange(len(frame.rows))
     at_stamp = frame.world_at_stamp(picked, velocity)

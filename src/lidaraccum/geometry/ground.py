@@ -75,6 +75,14 @@ def estimate_ground(points: NDArray[Any]) -> Ground:
     Works without any ground in sight too (then level is the sensor's own level, at the height of
     the lowest points), and does not depend on the order of the points.
     """
+    return level_by_ground(points)[0]
+
+
+def level_by_ground(points: NDArray[Any]) -> tuple[Ground, NDArray[np.float64]]:
+    """As `estimate_ground`, and the points (N, 3) in its level coordinates, laid out as they are.
+
+    Quickest column by column.
+    """
     plane = _fit_plane(_without_strays(_lowest(points)))
     level_from_sensor = _levelling(plane)
     level = transform(level_from_sensor, points)
@@ -86,7 +94,7 @@ def estimate_ground(points: NDArray[Any]) -> Ground:
         ground = _look_up(_counts(below) >= ROAD_POINTS, below)
         ground &= ~_under_the_road(below, flat, float(level_from_sensor[2, 3]))
         low = np.fmin(low, _lowest(below[ground]))
-    return Ground(level_from_sensor, _follow(_without_strays(low)))
+    return Ground(level_from_sensor, _follow(_without_strays(low))), level
 
 
 def _under_the_road(

@@ -16,12 +16,12 @@ FEW = 4096
 
 
 def transform(to_from: Pose, points: NDArray[Any]) -> NDArray[np.float64]:
-    """Move points (N, 3), metres, by a rigid motion (4, 4); float64 out."""
+    """Move points (N, 3), metres, by a rigid motion (4, 4); float64 out, laid out as they are."""
     points = np.asarray(points, dtype=np.float64)
     if len(points) <= FEW:
         return points @ to_from[:3, :3].T + to_from[:3, 3]
     x, y, z = np.ascontiguousarray(points.T)
-    moved = np.empty((len(x), 3))
+    moved = np.empty_like(points)
     # Column by column: a product of N x 3 by 3 x 3 wakes every BLAS thread, which costs more than
     # it saves, ten times more when the cores are busy.
     for row, (a, b, c, shift) in enumerate(to_from[:3]):

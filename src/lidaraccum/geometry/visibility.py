@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -93,10 +94,7 @@ class RangeView:
             own_from_points: (4, 4) into the frame's coordinates; they are in these when None.
         """
         pixels, ranges = self._pixels(*self._seen(points, own_from_points))
-        margin = MARGIN_M + MARGIN_PER_M * ranges
-        behind = self._nearest_solid.take(pixels) - ranges
-        met = (np.abs(behind) <= margin) | (np.abs(self._nearest.take(pixels) - ranges) <= margin)
-        return Sighting(through=(behind > margin) & ~met, met=met)
+        return _sighting(ranges, self._nearest.take(pixels), self._nearest_solid.take(pixels))
 
     def _seen(self, points: NDArray[Any], pose: rigid.Pose | None) -> Columns:
         """x, y, z (N,) of points (N, 3) from the viewpoint; a pose (4, 4) takes them here."""
@@ -113,14 +111,67 @@ class RangeView:
         self, x: NDArray[np.float32], y: NDArray[np.float32], z: NDArray[np.float32]
     ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
         """Pixel and range (N,) each of places x, y, z (N,) from the viewpoint."""
-        level = x * x + y * y
-        azimuth = np.arctan2(y, x) + np.float32(np.pi)
-        elevation = np.arctan2(z, np.sqrt(level)) + np.float32(np.pi / 2)
-        column = (azimuth * np.float32(self._columns / (2 * np.pi))).astype(np.int32)
-        column[column == self._columns] = 0
-        row = (elevation * np.float32(1 / self._step)).astype(np.int32)
-        row *= self._columns
-        return (row + column).astype(np.int64), np.sqrt(level + z * z)
+        return _pixels(x, y, z, self._columns, self._step)
+
+
+def look_together(
+    views: Sequence[RangeView], places: NDArray[np.float64], counts: NDArray[np.int64]
+) -> Sighting:
+    """What F frames saw, each of its own places: quicker than one by one where those are few.
+
+    Args:
+        views: The frames'.
+        places: (3, N) metres, frame by frame, each in its frame's coordinates.
+        counts: (F,) places of each frame, together N.
+    """
+    seen_from = np.array([view._viewpoint for view in views]).T.repeat(counts, axis=1)
+    x, y, z = (places - seen_from).astype(np.float32)
+    pixels, ranges = _pixels(
+        x,
+        y,
+        z,
+        np.array([view._columns for view in views]).repeat(counts),
+        np.array([view._step for view in views]).repeat(counts),
+    )
+    nearest, nearest_solid = np.empty((2, len(ranges)), dtype=np.float32)
+    start = 0
+    for view, count in zip(views, counts.tolist(), strict=True):
+        own = slice(start, start + count)
+        view._nearest.take(pixels[own], out=nearest[own], mode="clip")
+        view._nearest_solid.take(pixels[own], out=nearest_solid[own], mode="clip")
+        start += count
+    return _sighting(ranges, nearest, nearest_solid)
+
+
+def _sighting(
+    ranges: NDArray[np.float32], nearest: NDArray[np.float32], nearest_solid: NDArray[np.float32]
+) -> Sighting:
+    """What it means that rays about places at (N,) metres met their nearest at (N,) metres."""
+    margin = MARGIN_M + MARGIN_PER_M * ranges
+    behind = nearest_solid - ranges
+    met = (np.abs(behind) <= margin) | (np.abs(nearest - ranges) <= margin)
+    return Sighting(through=(behind > margin) & ~met, met=met)
+
+
+def _pixels(
+    x: NDArray[np.float32],
+    y: NDArray[np.float32],
+    z: NDArray[np.float32],
+    columns: int | NDArray[np.int64],
+    step: float | NDArray[np.float64],
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """Pixel and range (N,) each of places x, y, z (N,) from the viewpoint.
+
+    Images have so many columns and rows so many radians apart, (N,) or all the same.
+    """
+    level = x * x + y * y
+    azimuth = np.arctan2(y, x) + np.float32(np.pi)
+    elevation = np.arctan2(z, np.sqrt(level)) + np.float32(np.pi / 2)
+    column = (azimuth * np.float32(columns / (2 * np.pi))).astype(np.int32)
+    column[column == columns] = 0
+    row = (elevation * np.float32(1 / step)).astype(np.int64)
+    row *= columns
+    return row + column, np.sqrt(level + z * z)
 
 
 def _without_gaps(image: NDArray[np.float32]) -> NDArray[np.float32]:

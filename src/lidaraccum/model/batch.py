@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from lidaraccum.data.frame import Frame
 from lidaraccum.errors import InputError
-from lidaraccum.geometry import rigid
-from lidaraccum.geometry.ground import estimate_ground
+from lidaraccum.geometry.ground import level_by_ground
 from lidaraccum.model.settings import NetworkSettings
 
 
@@ -62,21 +61,20 @@ def prepare(
     kept = np.flatnonzero(frame.returned)
     if len(kept) == 0:
         raise InputError(f"frame {frame.name or frame.stamp} has no point that returned")
-    points = frame.points.take(kept, axis=0)  # several times faster than by brackets
-    ground = estimate_ground(points)
-    level = rigid.transform(ground.level_from_sensor, points)
+    # Column by column, and taken rather than picked by brackets: each is several times faster.
+    ground, level = level_by_ground(np.asfortranarray(frame.points.take(kept, axis=0)))
     row, column = ((level[:, axis] + 0.5 * extent) / settings.pillar_m for axis in (0, 1))
     inside = np.flatnonzero((row >= 0) & (row < cells) & (column >= 0) & (column < cells))
     cell = row[inside].astype(np.int32) * np.int32(cells) + column[inside].astype(np.int32)
-    level = level.take(inside, axis=0)
+    level = level.T.take(inside, axis=1).T
     height = ground.height_above(level)
     chosen = np.flatnonzero((height > settings.lowest_m) & (height < settings.highest_m))
     if len(chosen) == 0:
         raise InputError(f"frame {frame.name or frame.stamp} has no point within {extent / 2:g} m")
     chosen = chosen[np.argsort(cell[chosen])]
     return PreparedFrame(
-        points=level.take(chosen, axis=0).astype(np.float32),
-        height=height[chosen].astype(np.float32),
+        points=np.ascontiguousarray(level.T.take(chosen, axis=1).T, dtype=np.float32),
+        height=height.take(chosen).astype(np.float32),
         rows=kept[inside[chosen]],
         cell=cell[chosen],
         level_from_sensor=ground.level_from_sensor,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 
@@ -107,24 +107,24 @@ class MotionMap(nn.Module):
             half_extent_m: Half the side of the grid, metres.
         """
         times = _times(windows, stamps, presence.device)
-        warped = warp(torch.split(presence, 1), target_from_frame, windows, half_extent_m)
-        taken = nn.functional.max_pool2d(torch.cat(list(warped)), 2)[:, 0]
-        halved = [
-            self._halve(one, when)
-            for one, when in zip(
-                warp(base, target_from_frame, windows, half_extent_m), times, strict=True
-            )
-        ]
-        maps, first = [], 0
+        there, halved = [], []
+        for frame, when in enumerate(times):
+            maps = [presence[frame : frame + 1], base[frame]]
+            if frame in windows.sources:
+                maps = warp(maps, target_from_frame[frame], half_extent_m)
+            there.append(maps[0])
+            halved.append(self._halve(maps[1], when))
+        taken = nn.functional.max_pool2d(torch.cat(there), 2)[:, 0]
+        merged, first = [], 0
         for length in windows.lengths:
             own = slice(first, first + length)
             stack = halved[own]
             for block in self.blocks:
                 stack = block(stack)
             summary = moments(taken[own], times[own])[None].to(stack[0].dtype)
-            maps.append(torch.cat([reduce(torch.maximum, stack), summary], dim=1))
+            merged.append(torch.cat([reduce(torch.maximum, stack), summary], dim=1))
             first += length
-        return self.unet(torch.cat(maps).contiguous(memory_format=torch.channels_last))
+        return self.unet(torch.cat(merged).contiguous(memory_format=torch.channels_last))
 
     def _halve(self, base: torch.Tensor, when: torch.Tensor) -> torch.Tensor:
         """(1, C'', S/2, S/2) of warped base features (1, C, S, S), told their time (3,)."""
@@ -158,14 +158,15 @@ class _TemporalBlock(nn.Module):
         own = [torch.relu_(self.space(one)) for one in stack]
         rows = [_rows(one) for one in own]
         # As a convolution of three frames side by side, but they are never copied side by side.
-        weights = torch.split(self.time.weight[:, :, 0, 0], len(self.time.weight), dim=1)
+        weights = self.time.weight[:, :, 0, 0].to(rows[0].dtype)
+        before, now, after = torch.split(weights, len(weights), dim=1)
         mixed = []
         for place, one in enumerate(stack):
-            cells = nn.functional.linear(rows[place], weights[1], self.time.bias)
+            cells = nn.functional.linear(rows[place], now, self.time.bias)
             if place > 0:
-                cells = torch.addmm(cells, rows[place - 1], weights[0].T)
+                cells.addmm_(rows[place - 1], before.T)
             if place + 1 < len(stack):
-                cells = torch.addmm(cells, rows[place + 1], weights[2].T)
+                cells.addmm_(rows[place + 1], after.T)
             cells = torch.relu_(cells) + _rows(one)
             mixed.append(cells.view(1, *one.shape[2:], -1).permute(0, 3, 1, 2))
         return mixed
@@ -180,24 +181,18 @@ def _times(windows: Windows, stamps: tuple[float, ...], device: torch.device) ->
 
 
 def warp(
-    maps: Sequence[torch.Tensor],
-    target_from_frame: torch.Tensor,
-    windows: Windows,
-    half_extent_m: float,
-) -> Iterator[torch.Tensor]:
-    """Maps (1, C, S, S) of each of F frames, read where the target's cells lie in that frame.
+    maps: Sequence[torch.Tensor], target_from_frame: torch.Tensor, half_extent_m: float
+) -> list[torch.Tensor]:
+    """Maps (1, C, S, S) of one frame, read where the target's cells lie in that frame.
 
-    The target's own map stays as it is. Cells are taken to lie on the ground's plane.
+    Cells are taken to lie on the ground's plane.
     """
-    sources = windows.sources
-    for frame, one in enumerate(maps):
-        if frame not in sources:
-            yield one
-            continue
-        with exactly(one):
-            pose = target_from_frame[frame].float()
-            moved = _sample(one, *_cells_there(pose, one.shape[2], half_extent_m))
-        yield moved.view(one.shape[2], one.shape[3], -1).permute(2, 0, 1)[None]
+    with exactly(maps[0]):
+        size = maps[0].shape[2]
+        corners = _Corners.about(
+            *_cells_there(target_from_frame.float(), size, half_extent_m), size
+        )
+        return [corners.read(one).view(size, size, -1).permute(2, 0, 1)[None] for one in maps]
 
 
 def _cells_there(
@@ -226,41 +221,56 @@ def read(one: torch.Tensor, xy: torch.Tensor, half_extent_m: float) -> torch.Ten
     """
     size = one.shape[2]
     cells = _to_cells(xy.T / half_extent_m, size).clamp_(0.0, size - 1.0)
-    return _sample(one, cells[0], cells[1])
+    return _Corners.about(cells[0], cells[1], size).read(one)
 
 
-def _sample(one: torch.Tensor, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
-    """Bilinear reading (Q, C) of a map (1, C, H, H) at x and y (Q,) each, in cells; 0 outside.
+@dataclass(frozen=True, eq=False)
+class _Corners:
+    """The four cells about each of Q places on a map of H by H cells.
 
-    A weighted sum of four rows each: several times faster on processors than `grid_sample`, for
-    channels lie together in memory.
+    Attributes:
+        cell: (Q, 4) int32, row by row through the map.
+        share: (Q, 4) what each counts in a bilinear reading; 0 outside.
     """
-    size = one.shape[2]
-    corners = [
-        (row * size + column, share * part)
-        for row, share in _neighbours(x, size)
-        for column, part in _neighbours(y, size)
-    ]
-    summed = nn.functional.embedding_bag(
-        torch.stack([index for index, _ in corners], dim=1),
-        _rows(one).float(),
-        mode="sum",
-        per_sample_weights=torch.stack([weight for _, weight in corners], dim=1),
-    )
-    return summed.to(one.dtype)
+
+    cell: torch.Tensor
+    share: torch.Tensor
+
+    @classmethod
+    def about(cls, x: torch.Tensor, y: torch.Tensor, size: int) -> _Corners:
+        """Of places x and y (Q,) each, in cells."""
+        corners = [
+            (row * size + column, share * part)
+            for row, share in _neighbours(x, size)
+            for column, part in _neighbours(y, size)
+        ]
+        cells, shares = zip(*corners, strict=True)
+        return cls(torch.stack(cells, dim=1), torch.stack(shares, dim=1))
+
+    def read(self, one: torch.Tensor) -> torch.Tensor:
+        """Bilinear reading (Q, C) of a map (1, C, H, H).
+
+        A weighted sum of four rows each: several times faster on processors than `grid_sample`,
+        for channels lie together in memory.
+        """
+        rows = _rows(one).float()
+        if rows.shape[1] == 1:
+            return (rows[:, 0][self.cell] * self.share).sum(dim=1, keepdim=True).to(one.dtype)
+        summed = nn.functional.embedding_bag(
+            self.cell, rows, mode="sum", per_sample_weights=self.share
+        )
+        return summed.to(one.dtype)
 
 
 def _neighbours(at: torch.Tensor, size: int) -> list[tuple[torch.Tensor, torch.Tensor]]:
     """The two cells (Q,) int32 beside places (Q,) on an axis, and their shares; 0 if outside."""
     low = at.floor()
     part = at - low
-    return [
-        (
-            cell.clamp(0.0, size - 1.0).int(),
-            torch.where((cell < 0.0) | (cell > size - 1.0), 0.0, share),
-        )
-        for cell, share in ((low, 1.0 - part), (low + 1.0, part))
-    ]
+    found = []
+    for cell, share in ((low, 1.0 - part), (low + 1.0, part)):
+        inside = cell.clamp(0.0, size - 1.0)
+        found.append((inside.int(), share * (inside == cell)))
+    return found
 
 
 def _rows(one: torch.Tensor) -> torch.Tensor:

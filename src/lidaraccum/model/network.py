@@ -17,7 +17,7 @@ from lidaraccum.model.pillars import PillarEncoder
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.model.steady import outward, steady
 from lidaraccum.model.tube import TubeMotions, TubeNet, Tubes, gather_tubes
-from lidaraccum.model.unet import UNet, channels_last, convolution
+from lidaraccum.model.unet import UNet, channels_last, convolution, to_one_channel
 
 FOREGROUND_GATE = -1.0
 """Points are looked at closely when their pillar's foreground logit is above this (0.27): the
@@ -174,8 +174,9 @@ class Network(nn.Module):
             matchable: Whether somebody is to match them; else no background pillars are drawn.
         """
         base = self.backbone(self.pillars(frames))
-        scores = self.foreground_head(base).float()[:, 0].reshape(-1)
-        foreground = scores.index_select(0, frames.pillar_place)
+        narrow, rectify, last = self.foreground_head
+        scores = to_one_channel(cast("nn.Conv2d", last), rectify(narrow(base))).float()
+        foreground = scores.reshape(-1).index_select(0, frames.pillar_place)
         if matchable:
             ego = self._ego(frames, base, foreground.detach(), choice)
         else:

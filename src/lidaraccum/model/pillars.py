@@ -30,24 +30,40 @@ class PillarEncoder(nn.Module):
 
     def forward(self, frames: FrameTensors) -> torch.Tensor:
         """Encode F frames."""
-        hidden = torch.relu_(self.inner(_point_features(frames)))
-        hidden = self.outer(hidden)  # (P, C'); the maximum holds the ReLU
+        hidden = torch.relu_(nn.functional.linear(_point_features(frames), _with_one(self.inner)))
+        hidden = nn.functional.linear(hidden, _with_bias(self.outer))  # the maximum holds the ReLU
         pooled = tallest(hidden, frames.pillar, len(frames.pillar_cell))
         pillars = self.project(self.normalise(pooled).to(hidden.dtype))  # (V, C)
         canvas = pillars.new_zeros(len(frames) * frames.cells * frames.cells, pillars.shape[1])
-        canvas = canvas.index_copy(0, frames.pillar_place, pillars)
+        canvas.index_copy_(0, frames.pillar_place, pillars)
         rows = canvas.view(len(frames), frames.cells, frames.cells, -1)
         return rows.permute(0, 3, 1, 2)  # (F, C, S, S), channels last in memory
 
 
 def _point_features(frames: FrameTensors) -> torch.Tensor:
-    """(P, 6): place in the pillar, place against the pillar's mean, height above ground."""
+    """(P, 7): place in the pillar, place against the pillar's mean, height above ground, and 1."""
     home = torch.cat(
         [frames.pillar_centres(), frames.pillar_mean[:, :2], frames.pillar_height[:, None]], dim=1
     ).index_select(0, frames.pillar)
     xy = frames.points[:, :2]
     height = frames.height[:, None]
-    told = torch.cat([xy, xy, height, height], dim=1)
+    told = torch.cat([xy, xy, height, height, torch.ones_like(height)], dim=1)
     told[:, :5] -= home
-    measures = [frames.pillar_m] * 4 + [_HEIGHT_SCALE_M] * 2
+    measures = [frames.pillar_m] * 4 + [_HEIGHT_SCALE_M] * 2 + [1.0]
     return told.div_(told.new_tensor(measures))
+
+
+def _with_bias(layer: nn.Linear) -> torch.Tensor:
+    """Weights (O, I + 1) of a layer that is told 1 beside its inputs.
+
+    To add the bias costs as much as all the rest where rows are many and channels few.
+    """
+    return torch.cat([layer.weight, layer.bias[:, None]], dim=1)
+
+
+def _with_one(layer: nn.Linear) -> torch.Tensor:
+    """As `_with_bias`, with a row more (O + 1, I + 1) that hands the 1 on."""
+    weights = _with_bias(layer)
+    one = weights.new_zeros(1, weights.shape[1])
+    one[0, -1] = 1.0
+    return torch.cat([weights, one])

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import torch
 
-_CPU_FLAGS = ("avx512_bf16", "amx_bf16")
+_BFLOAT16_FLAGS = ("avx512_bf16", "amx_bf16")
+_BYTE_FLAGS = ("avx512_vnni", "avx_vnni")
 
 
 def inference(device: torch.device | str = "cpu") -> AbstractContextManager[object]:
@@ -25,14 +26,20 @@ def has_bfloat16(device: torch.device | str) -> bool:
     device = torch.device(device)
     if device.type == "cuda":
         return torch.cuda.get_device_capability(device)[0] >= 8
-    return device.type == "cpu" and _cpu_has_bfloat16()
+    return device.type == "cpu" and not _cpu_flags().isdisjoint(_BFLOAT16_FLAGS)
+
+
+def has_byte_units() -> bool:
+    """Whether the processor multiplies bytes faster than float32."""
+    return not _cpu_flags().isdisjoint(_BYTE_FLAGS)
 
 
 @cache
-def _cpu_has_bfloat16() -> bool:
+def _cpu_flags() -> frozenset[str]:
+    """What the processor says that it can do."""
     try:
         described = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
     except OSError:  # not Linux: nothing says so
-        return False
+        return frozenset()
     flags = next((line for line in described.splitlines() if line.startswith("flags")), "")
-    return any(flag in flags.split() for flag in _CPU_FLAGS)
+    return frozenset(flags.split())

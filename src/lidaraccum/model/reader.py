@@ -15,6 +15,7 @@ from lidaraccum.data.frame import Frame
 from lidaraccum.errors import InputError
 from lidaraccum.geometry import rigid
 from lidaraccum.model.batch import prepare, to_arrays, to_indices, to_tensors
+from lidaraccum.model.bytes import in_bytes
 from lidaraccum.model.checkpoint import load_network
 from lidaraccum.model.motion import Windows
 from lidaraccum.model.network import FrameFeatures, Network, Perception, some_close_points
@@ -75,7 +76,7 @@ class NetworkReader:
             MissingInputError: There is no such file.
             InputError: It holds no weights of this network.
         """
-        return cls(load_network(path), weights_hash(path))
+        return cls(in_bytes(load_network(path)), weights_hash(path))
 
     @property
     def weights(self) -> str:

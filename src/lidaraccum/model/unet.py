@@ -28,6 +28,22 @@ def linear(inputs: int, outputs: int) -> nn.Linear:
     return layer
 
 
+def to_one_channel(layer: nn.Conv2d, maps: torch.Tensor) -> torch.Tensor:
+    """What a 3 x 3 convolution to one channel makes of maps (N, C, H, W): (N, H, W).
+
+    A product for all nine taps at once, then nine shifted sums of single channels: twice as fast on
+    processors as the convolution, which keeps a whole vector busy with one channel.
+    """
+    count, _, height, width = maps.shape
+    taps = nn.functional.linear(maps.permute(0, 2, 3, 1), layer.weight[0].flatten(1).T)
+    taps = nn.functional.pad(taps, (0, 0, 1, 1, 1, 1))
+    summed = cast("torch.Tensor", layer.bias).expand(count, height, width)
+    for tap in range(9):
+        down, right = divmod(tap, 3)
+        summed = summed + taps[:, down : down + height, right : right + width, tap]
+    return summed
+
+
 def channels_last(module: nn.Module) -> None:
     """Lay out all convolutions as processors like them; numbers stay the same."""
     for parameter in module.parameters():

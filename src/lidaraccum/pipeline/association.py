@@ -11,14 +11,10 @@ from numpy.typing import NDArray
 from lidaraccum.geometry import rigid
 from lidaraccum.pipeline.courses import are_alike, turned
 from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.joining import LIKE_SPEED_MPS, LIKE_SPEED_SHARE
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.object_ids import ObjectIds
-from lidaraccum.pipeline.objects import (
-    LIKE_SPEED_MPS,
-    LIKE_SPEED_SHARE,
-    Expectation,
-    WindowObject,
-)
+from lidaraccum.pipeline.objects import Expectation, WindowObject
 from lidaraccum.pipeline.shape import ObjectShape
 
 OVERLAP = 0.3

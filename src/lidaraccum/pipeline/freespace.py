@@ -57,7 +57,7 @@ class SightedFrame:
         settings: MotionSettings,
         viewpoint: NDArray[np.float64] | None = None,
     ) -> None:
-        points = registered.frame.points
+        points = np.asfortranarray(registered.frame.points)  # all looks go column by column
         if np.abs(points).max(initial=0.0) > FARTHEST_ECHO_M:
             # What no sensor can have seen counts as no return: it would stretch every grid.
             beyond = np.abs(points).max(axis=1) > FARTHEST_ECHO_M
@@ -80,12 +80,12 @@ class SightedFrame:
         self.close_rows = np.flatnonzero(
             ~outside & low_enough & obstacle & (squared > MIN_RANGE_M**2)
         )
-        self.close_points = points[self.close_rows].astype(np.float64)
+        self.close_points = _picked(points, self.close_rows)
         near = np.concatenate([self.rows, self.low_rows])
-        self.near_points = points[near].astype(np.float64)
-        self.near_heights = heights[near]
+        self.near_points = _picked(points, near)
+        self.near_heights = heights.take(near)
         seconds = registered.seconds_within_sweep
-        self.seconds = np.zeros(len(self.rows)) if seconds is None else seconds[self.rows]
+        self.seconds = np.zeros(len(self.rows)) if seconds is None else seconds.take(self.rows)
         self.segments = connected_cells(self.points, settings.cell_m)
         self.segment_sizes = np.bincount(self.segments)
         self.through = np.zeros(len(self.rows), dtype=np.int16)
@@ -123,9 +123,13 @@ class SightedFrame:
 
     @cached_property
     def tree(self) -> cKDTree:
-        """Obstacles and low points by `places`."""
-        places = self.places(self.near_points, self.near_heights)
-        return cKDTree(places, balanced_tree=False, compact_nodes=False)
+        """Obstacles and low points by their places."""
+        return cKDTree(self.near_places, balanced_tree=False, compact_nodes=False)
+
+    @cached_property
+    def near_places(self) -> NDArray[np.float64]:
+        """The `places` (M + L, 3) of obstacles and low points."""
+        return self.places(self.near_points, self.near_heights)
 
     @cached_property
     def level(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -141,12 +145,7 @@ class SightedFrame:
             heights: (N,) metres above the ground: hills do not part what is one thing.
         """
         x, y = points[:, 0], points[:, 1]
-        return np.column_stack([x, y, self.height_weight(x, y) * heights])
-
-    def height_weight(self, x: NDArray[Any], y: NDArray[Any]) -> NDArray[np.float64]:
-        """What heights count in distances, (...) each, at x and y (...), sensor coordinates."""
-        spacing = self.gap * np.sqrt(x * x + y * y)
-        return np.minimum(HEIGHT_WEIGHT, BEAM_ALLOWANCE_M / np.maximum(spacing, 1e-3))
+        return np.column_stack([x, y, height_weight(x, y, self.gap) * heights])
 
     def world(self, picked: NDArray[np.int64]) -> NDArray[np.float64]:
         """Some of the obstacles (K,) in the world, (K, 3) metres."""
@@ -175,7 +174,7 @@ class SightedFrame:
 
     def seconds_toward(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
         """As `seconds_at` where `is_timed`, for x and y (...) each: (...) seconds."""
-        return self._seconds_by_azimuth[_azimuth_bins(x - self.viewpoint[0], y - self.viewpoint[1])]
+        return self.seconds_by_azimuth[azimuth_bins(x - self.viewpoint[0], y - self.viewpoint[1])]
 
     @cached_property
     def is_timed(self) -> bool:
@@ -183,9 +182,10 @@ class SightedFrame:
         return bool(self.seconds.any())
 
     @cached_property
-    def _seconds_by_azimuth(self) -> NDArray[np.float64]:
+    def seconds_by_azimuth(self) -> NDArray[np.float64]:
+        """(`AZIMUTH_BINS`,) seconds after the stamp at which the sweep passed each direction."""
         x, y = self.level
-        bins = _azimuth_bins(x - self.viewpoint[0], y - self.viewpoint[1])
+        bins = azimuth_bins(x - self.viewpoint[0], y - self.viewpoint[1])
         counts = np.bincount(bins, minlength=AZIMUTH_BINS)
         sums = np.bincount(bins, self.seconds, minlength=AZIMUTH_BINS)
         full = np.flatnonzero(counts)
@@ -222,7 +222,24 @@ class SightedFrame:
         other.met += sighting.met
 
 
-def _azimuth_bins(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
+def _picked(points: NDArray[np.float32], rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Some of the points (N, 3), laid out column by column, row by row (K, 3)."""
+    return np.ascontiguousarray(points.T.take(rows, axis=1).T, dtype=np.float64)
+
+
+def height_weight(
+    x: NDArray[Any], y: NDArray[Any], gap: float | NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """What heights count in distances, (...) each, at x and y (...) from sensors.
+
+    ``gap`` is the angle between their beams, radians, (...) or one for all.
+    """
+    spacing = gap * np.sqrt(x * x + y * y)
+    return np.minimum(HEIGHT_WEIGHT, BEAM_ALLOWANCE_M / np.maximum(spacing, 1e-3))
+
+
+def azimuth_bins(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Which of `AZIMUTH_BINS` directions, all round, each of x and y (...) lies in."""
     angle = np.arctan2(y.astype(np.float32), x.astype(np.float32))
     bins = (angle * np.float32(AZIMUTH_BINS / (2 * np.pi))).astype(np.int64)
     bins[bins < 0] += AZIMUTH_BINS

@@ -13,7 +13,7 @@ from lidaraccum.geometry.clustering import connected_cells
 from lidaraccum.geometry.voxel import thin
 from lidaraccum.pipeline.courses import turned
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.landing import land
+from lidaraccum.pipeline.landing import Lineup
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.suspects import Suspect, whole_template
 from lidaraccum.pipeline.verdict import judge_points
@@ -93,15 +93,14 @@ def _lain_on(
     whole_only: bool,
 ) -> dict[int, NDArray[np.int64]]:
     """By frame index: the obstacles (K,) of other frames that some of this one's, moved, lie on."""
-    template, motion = whole_template(own, picked), (velocity[None], np.array([turn]))
-    gathered = {}
-    for frame in frames:
-        if frame is own:
-            continue
-        local = land(template, *motion, frame)[:, 0].T
+    template = whole_template(own, picked)
+    lineup = Lineup([frame for frame in frames if frame is not own])
+    landed = lineup.land(template, velocity[None], np.array([turn]))[:, :, 0]
+    gathered, range_m = {}, _mean_range(own.points[picked])
+    for frame, local in zip(lineup.frames, landed.transpose(1, 2, 0), strict=True):
         places = frame.places(local, template.heights)
         found = _points_at(frame, places, whole_only=whole_only)
-        nearer = max(1.0, _mean_range(own.points[picked]) / max(_mean_range(local), 0.1))
+        nearer = max(1.0, range_m / max(_mean_range(local), 0.1))
         if 0 < len(found) < MOST_GROWTH * len(picked) * nearer**2:
             gathered[frame.index] = found
     return gathered
@@ -119,7 +118,7 @@ def _points_at(
     about = np.flatnonzero((x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]))
     if len(about) == 0:
         return about
-    own = frame.places(frame.points[about], frame.heights[about])
+    own = frame.near_places.take(about, axis=0)
     tree = cKDTree(places, balanced_tree=False, compact_nodes=False)
     distance, _ = tree.query(own, distance_upper_bound=JOIN_M)
     close = about[np.isfinite(distance)]
@@ -157,7 +156,7 @@ def without_standing(
             sample = doubtful[thin(frame.points[doubtful], 0.2)]
             template = whole_template(frame, sample)
             rivals = np.stack([np.zeros(3), turned(velocity, turn * (frame.stamp - stamp))])
-            cost, _ = judge_points(template, rivals, frames, settings, np.array([0.0, turn]))
+            cost = judge_points(template, rivals, frames, settings, np.array([0.0, turn]))
             stands = cost[0] + margin < cost[1]
             if stands.any():
                 _, nearest = cKDTree(frame.points[sample]).query(frame.points[doubtful])

@@ -11,7 +11,7 @@ from scipy import ndimage
 from lidaraccum.geometry import rigid
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
-from lidaraccum.pipeline.suspects import Suspect, Template, make_template
+from lidaraccum.pipeline.suspects import Suspect, Template, template_of
 
 MAX_SHIFTS = 8
 """Centroid shifts that are tried, the shortest first."""
@@ -35,9 +35,10 @@ def propose(
 ) -> NDArray[np.float64]:
     """Velocities (H, 3) in the world, m/s, level, that might explain the suspect."""
     proposals = centroid_shifts(suspect, suspects, frames, settings)
+    template = template_of(frames[suspect.frame], suspect.picked, VOTE_POINTS)
     for place in (suspect.frame - 1, suspect.frame + 1):
         if 0 <= place < len(frames):
-            proposals += vote_peaks(suspect, frames[suspect.frame], frames[place], settings)
+            proposals += vote_peaks(template, frames[place], settings)
     return np.array(proposals).reshape(-1, 3)
 
 
@@ -48,25 +49,29 @@ def centroid_shifts(
     settings: MotionSettings,
 ) -> list[NDArray[np.float64]]:
     """Velocities to the centres of like suspects in the two frames before and after."""
-    found = []
-    for other in suspects:
-        seconds = frames[other.frame].stamp - frames[suspect.frame].stamp
-        if seconds == 0 or abs(other.frame - suspect.frame) > 2:
-            continue
-        velocity = (other.centre - suspect.centre) * (1.0, 1.0, 0.0) / seconds
-        alike = 1 / SIZE_RATIO < len(other) / len(suspect) < SIZE_RATIO
-        if alike and np.linalg.norm(velocity) < settings.max_speed_mps:
-            found.append(velocity)
-    return sorted(found, key=lambda velocity: float(np.linalg.norm(velocity)))[:MAX_SHIFTS]
+    near = [
+        other
+        for other in suspects
+        if 0 < abs(other.frame - suspect.frame) <= 2
+        and 1 / SIZE_RATIO < len(other) / len(suspect) < SIZE_RATIO
+    ]
+    if not near:
+        return []
+    seconds = np.array([frames[other.frame].stamp for other in near]) - frames[suspect.frame].stamp
+    ways = (np.array([other.centre for other in near]) - suspect.centre) * (1.0, 1.0, 0.0)
+    apart = seconds != 0
+    velocities = ways[apart] / seconds[apart, None]
+    speeds = np.linalg.norm(velocities, axis=1)
+    order = np.argsort(speeds, kind="stable")[:MAX_SHIFTS]
+    return list(velocities[order[speeds[order] < settings.max_speed_mps]])
 
 
 def vote_peaks(
-    suspect: Suspect, own: SightedFrame, other: SightedFrame, settings: MotionSettings
+    template: Template, other: SightedFrame, settings: MotionSettings
 ) -> list[NDArray[np.float64]]:
-    """Velocities by which most points of the suspect would fall on seen-through ones."""
-    seconds = other.stamp - own.stamp
+    """Velocities by which most points of a suspect would fall on seen-through ones."""
+    seconds = other.stamp - template.stamp
     reach = min(settings.max_speed_mps * abs(seconds), VOTE_REACH_M)
-    template = make_template(own, suspect.picked, VOTE_POINTS)
     votes = _differences(template, other, reach)
     bins = int(2 * reach / VOTE_BIN_M)
     cells = np.floor((votes + reach) / VOTE_BIN_M).astype(np.int64)

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
-from lidaraccum.pipeline.courses import are_alike, turned
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.gathering import STANDING_MARGIN, gather, without_standing
 from lidaraccum.pipeline.motion_settings import MotionSettings
-from lidaraccum.pipeline.suspects import Suspect, make_template
+from lidaraccum.pipeline.suspects import (
+    Suspect,
+    Template,
+    make_template,
+    spread_out,
+    template_of,
+)
 from lidaraccum.pipeline.verdict import (
     Verdict,
     bend_course,
@@ -51,17 +55,6 @@ much less cost than standing."""
 AS_SENSOR_MPS = 0.5
 AS_SENSOR_SHARE = 0.25
 """Velocities nearer than this, and this share of its speed, are the sensor's own."""
-
-SAME_GAP_M = 0.8
-SAME_SPEED_MPS = 0.8
-"""Two movers nearer than this and with velocities as like as this are one."""
-
-LIKE_SPEED_MPS = 2.0
-LIKE_SPEED_SHARE = 0.3
-NO_WORSE = 0.05
-"""So are two whose velocities differ by less than this and this share of the speed, where one of
-the motions costs the other's points at most so much more than their own: the long side of a truck
-fits many velocities, its ends one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,11 +99,30 @@ class WindowObject:
     unseen: bool = False
 
 
-def stands(suspect: Suspect, frames: Sequence[SightedFrame], settings: MotionSettings) -> bool:
-    """Whether standing still explains a suspect so well that no motion could do better."""
-    rough = make_template(frames[suspect.frame], suspect.picked, FIRST_LOOK_POINTS)
+@dataclass(frozen=True, eq=False)
+class FirstLook:
+    """What a suspect shows at first sight.
+
+    Attributes:
+        spread: (K,) int64: its obstacles that templates are made of, see `spread_out`.
+        template: A few of them.
+        standing: What standing still costs.
+    """
+
+    spread: NDArray[np.int64]
+    template: Template
+    standing: float
+
+
+def look_at(
+    suspect: Suspect, frames: Sequence[SightedFrame], settings: MotionSettings
+) -> FirstLook:
+    """A suspect at first sight."""
+    own = frames[suspect.frame]
+    spread = spread_out(own, suspect.picked)
+    rough = make_template(own, spread, FIRST_LOOK_POINTS, suspect.centre)
     still = judge(rough, np.zeros((1, 3)), _probes(frames), settings)
-    return bool(still.cost[0] < settings.margin)
+    return FirstLook(spread, rough, float(still.cost[0]))
 
 
 def explain(
@@ -119,6 +131,7 @@ def explain(
     frames: Sequence[SightedFrame],
     settings: MotionSettings,
     turns: NDArray[np.float64] | None = None,
+    first: FirstLook | None = None,
 ) -> WindowObject | None:
     """The suspect as a mover, or None when standing still explains its points as well.
 
@@ -128,29 +141,27 @@ def explain(
         frames: The window.
         settings: What counts as a mover.
         turns: (H,) radians a second, worth trying with them; straight on when None.
+        first: What `look_at` says of the suspect, where somebody has looked.
     """
-    own = frames[suspect.frame]
-    turns = np.zeros(len(proposals)) if turns is None else turns
-    still = np.zeros((1, 3))
-    probes = _probes(frames)
-    rough = make_template(own, suspect.picked, FIRST_LOOK_POINTS)
     if len(proposals) == 0:
         return None
-    first = judge(
-        rough, np.concatenate([still, proposals]), probes, settings, np.append(0.0, turns)
-    ).cost
-    if first[0] < settings.margin:
+    first = first or look_at(suspect, frames, settings)
+    if first.standing < settings.margin:
         return None
-    chosen = np.argsort(first[1:], kind="stable")[:REFINED_HYPOTHESES]
+    own = frames[suspect.frame]
+    turns = np.zeros(len(proposals)) if turns is None else turns
+    probes, rough = _probes(frames), first.template
+    cost = judge(rough, proposals, probes, settings, turns).cost
+    chosen = np.argsort(cost, kind="stable")[:REFINED_HYPOTHESES]
     refined, turns = proposals[chosen], turns[chosen]
-    if not _is_promising(first[1:].min(), first[0], settings):
+    if not _is_promising(cost.min(), first.standing, settings):
         refined = refine_velocities(rough, refined, turns, probes, settings, steps=1)
-        second = judge(rough, refined, probes, settings, turns).cost
-        if not _is_promising(second.min(), first[0], settings):
+        cost = judge(rough, refined, probes, settings, turns).cost
+        if not _is_promising(cost.min(), first.standing, settings):
             return None
     refined = refine_velocities(rough, refined, turns, probes, settings)
-    template = make_template(own, suspect.picked, TEMPLATE_POINTS)
-    rivals = np.concatenate([still, refined])
+    template = make_template(own, first.spread, TEMPLATE_POINTS, suspect.centre)
+    rivals = np.concatenate([np.zeros((1, 3)), refined])
     turning = np.concatenate([[0.0], turns])
     verdict = judge(template, rivals, probes, settings, turning)
     best = int(verdict.cost.argmin())
@@ -205,7 +216,7 @@ def _all_goes_along(
     about = about[stands & ~np.isin(own.segments[about], own.segments[suspect.picked])]
     if len(about) < TEMPLATE_POINTS:
         return False
-    template = make_template(own, about, TEMPLATE_POINTS)
+    template = template_of(own, about, TEMPLATE_POINTS)
     rivals, turns = np.stack([np.zeros(3), velocity]), np.array([0.0, turn])
     verdict = judge(template, rivals, _probes(frames), settings, turns)
     return bool(verdict.shown[1] > GOES_ALONG)
@@ -269,85 +280,3 @@ def _goes_as_sensor(
     speed = float(np.linalg.norm(velocity))
     apart_m = abs(float(way @ velocity) / speed - speed * seconds)
     return apart_m < (AS_SENSOR_MPS + AS_SENSOR_SHARE * speed) * seconds
-
-
-def join_parts(
-    objects: Sequence[WindowObject], frames: Sequence[SightedFrame], settings: MotionSettings
-) -> list[WindowObject]:
-    """Movers that touch and move alike, or as well, made one.
-
-    The largest part's motion stands for all, unless only a smaller one's explains both.
-    """
-    joined: list[WindowObject] = []
-    for part in objects:
-        for place, whole in enumerate(joined):
-            united = _united_if_one(part, whole, frames, settings)
-            if united is not None:
-                joined[place] = united
-                break
-        else:
-            joined.append(part)
-    return joined
-
-
-def _united_if_one(
-    part: WindowObject,
-    whole: WindowObject,
-    frames: Sequence[SightedFrame],
-    settings: MotionSettings,
-) -> WindowObject | None:
-    velocities = whole.velocity, part.velocity
-    if not are_alike(*velocities, LIKE_SPEED_MPS, LIKE_SPEED_SHARE):
-        return None
-    if not _touch(part, whole, frames):
-        return None
-    if are_alike(*velocities, SAME_SPEED_MPS, 0.0) or _goes_with(part, whole, frames, settings):
-        return _united(whole, part)
-    return _united(part, whole) if _goes_with(whole, part, frames, settings) else None
-
-
-def _goes_with(
-    one: WindowObject, other: WindowObject, frames: Sequence[SightedFrame], settings: MotionSettings
-) -> bool:
-    """Whether another's motion explains a mover's points as well as its own."""
-    own = max(frames, key=lambda frame: len(one.picked.get(frame.index, ())))
-    template = make_template(own, one.picked[own.index], TEMPLATE_POINTS)
-    velocities = [
-        turned(mover.velocity, mover.turn * (own.stamp - mover.stamp)) for mover in (one, other)
-    ]
-    turns = np.array([one.turn, other.turn])
-    cost = judge(template, np.stack(velocities), frames, settings, turns).cost
-    return bool(cost[1] < cost[0] + NO_WORSE)
-
-
-def _touch(part: WindowObject, whole: WindowObject, frames: Sequence[SightedFrame]) -> bool:
-    """Whether some frame shows them close together, or as ends of one cluster."""
-    for frame in frames:
-        if frame.index in part.picked and frame.index in whole.picked:
-            some, others = part.picked[frame.index], whole.picked[frame.index]
-            clusters = np.zeros(len(frame.segment_sizes), dtype=np.bool_)
-            clusters[frame.segments[others]] = True
-            if clusters[frame.segments[some]].any():
-                return True
-            if _are_near(frame.points[some], frame.points[others]):
-                return True
-    return False
-
-
-def _are_near(some: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
-    """Whether some of points (N, 3) are nearer than `SAME_GAP_M` to one of others (M, 3)."""
-    low = np.maximum(some.min(axis=0), others.min(axis=0)) - SAME_GAP_M
-    high = np.minimum(some.max(axis=0), others.max(axis=0)) + SAME_GAP_M
-    some = some[((some >= low) & (some <= high)).all(axis=1)]
-    others = others[((others >= low) & (others <= high)).all(axis=1)]
-    if len(some) == 0 or len(others) == 0:
-        return False
-    distance, _ = cKDTree(others).query(some, distance_upper_bound=SAME_GAP_M)
-    return bool(np.isfinite(distance).any())
-
-
-def _united(whole: WindowObject, part: WindowObject) -> WindowObject:
-    picked = dict(whole.picked)
-    for index, rows in part.picked.items():
-        picked[index] = np.union1d(picked[index], rows) if index in picked else rows
-    return replace(whole, picked=picked)

@@ -12,8 +12,9 @@ from lidaraccum.pipeline.courses import are_alike
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.gathering import WHOLE_GROWTH, with_middle
 from lidaraccum.pipeline.hypotheses import propose
+from lidaraccum.pipeline.joining import join_parts
 from lidaraccum.pipeline.motion_settings import LIKELY, MotionSettings
-from lidaraccum.pipeline.objects import Expectation, WindowObject, explain, join_parts, stands
+from lidaraccum.pipeline.objects import Expectation, WindowObject, explain, look_at
 from lidaraccum.pipeline.suspects import Lead, Suspect, find_suspects
 
 EXPECTED_M = 1.5
@@ -94,13 +95,16 @@ def _accused(
     claimed = _Claimed(frames)
     unseen: list[tuple[Suspect, WindowObject]] = []
     for suspect in suspects:
-        if claimed.share(suspect) > CLAIMED_SHARE or stands(suspect, frames, settings):
+        if claimed.share(suspect) > CLAIMED_SHARE:
+            continue
+        first = look_at(suspect, frames, settings)
+        if first.standing < settings.margin:
             continue
         known = _expected_velocities(suspect, frames[suspect.frame].stamp, expected)
-        found = explain(suspect, known, frames, settings) if len(known) else None
+        found = explain(suspect, known, frames, settings, first=first)
         if found is None:
             proposals = propose(suspect, suspects, frames, settings)
-            found = explain(suspect, proposals, frames, settings)
+            found = explain(suspect, proposals, frames, settings, first=first)
         if found is not None and found.unseen:
             unseen.append((suspect, found))
         else:

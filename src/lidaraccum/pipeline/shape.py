@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,7 +18,9 @@ MAX_POINTS = 3000
 FIT_POINTS = 120
 NEIGHBOURS = 8
 REACH_M = 0.5
-STEPS = 4
+SEARCHES = 3
+STEPS = 2
+"""The surface near the points is looked for so often, and so many steps are taken each time."""
 
 ACROSS_M = 0.03
 ALONG_M = 0.6
@@ -110,12 +112,13 @@ class ObjectShape:
         surface = self._surface_at(chosen)
         before = surface.residual_m
         total = np.zeros(4)
-        for _ in range(STEPS):
-            step = surface.step(total)
-            total = total + step
-            surface = self._surface_at(rigid.transform(_level_motion(total), chosen))
-            if np.abs(step).max() < 1e-3:
-                break
+        for search in range(SEARCHES):
+            if search:
+                surface = self._surface_at(surface.place.T)
+            for _ in range(STEPS):
+                total = total + surface.step(total)
+                moved = rigid.transform(_level_motion(total), chosen)
+                surface = replace(surface, place=moved.T)
         too_far = np.hypot(total[0], total[1]) > MAX_SHIFT_M or abs(total[3]) > MAX_TURN
         if too_far or not surface.residual_m < before:
             return ShapeFit(np.eye(4), before)
@@ -126,7 +129,7 @@ class ObjectShape:
         count = min(NEIGHBOURS, len(self._points))
         distance, rows = self._tree.query(points, k=count)
         distance, rows = distance.reshape(len(points), count), rows.reshape(len(points), count)
-        around = self._columns[:, rows]
+        around = self._columns.take(rows, axis=1)
         centre = around.mean(axis=2)
         spread = around - centre[:, :, None]
         second = (spread[_UPPER[0]] * spread[_UPPER[1]]).sum(axis=2) / count
@@ -134,7 +137,7 @@ class ObjectShape:
         least, middle, most = variances.T
         return _Surface(
             place=points.T,
-            lag=centre - points.T,
+            centre=centre,
             normal=normals.T,
             # Neighbours on one line, as those of one beam are, tell no normal.
             flatness=np.clip(2 * (middle - least) / np.maximum(most, 1e-9), 0, 1),
@@ -149,7 +152,7 @@ class _Surface:
 
     Attributes:
         place: (3, N) the points, metres, the shape's coordinates.
-        lag: (3, N) from them to the centres of the planes' points.
+        centre: (3, N) of the planes' points.
         normal: (3, N) unit vectors.
         flatness: (N,) 0..1: how far the plane's points tell its normal.
         spread_m: (N,) of the plane's points about their centre.
@@ -157,18 +160,23 @@ class _Surface:
     """
 
     place: NDArray[np.float64]
-    lag: NDArray[np.float64]
+    centre: NDArray[np.float64]
     normal: NDArray[np.float64]
     flatness: NDArray[np.float64]
     spread_m: NDArray[np.float64]
     near: NDArray[np.bool_]
 
     @cached_property
+    def lag(self) -> NDArray[np.float64]:
+        """(3, N) metres from the points to the planes' centres."""
+        return self.centre - self.place
+
+    @cached_property
     def across(self) -> NDArray[np.float64]:
         """(N,) metres from the points to their planes, along the normals."""
         return np.asarray((self.lag * self.normal).sum(axis=0))
 
-    @property
+    @cached_property
     def residual_m(self) -> float:
         """Median distance to the planes."""
         return float(np.median(np.where(self.near, np.abs(self.across), REACH_M)))

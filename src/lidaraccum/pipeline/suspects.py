@@ -13,6 +13,9 @@ from lidaraccum.geometry.voxel import thin
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
 
+SPREAD_M = 0.1
+"""A template has no more than one point of each cube so wide."""
+
 MIN_TOP_M = 0.5
 """Nothing that moves on a street is lower than this."""
 
@@ -109,13 +112,24 @@ class Template:
     pivot: NDArray[np.float64]
 
 
-def make_template(frame: SightedFrame, picked: NDArray[np.int64], count: int) -> Template:
-    """At most ``count`` of the picked obstacles (K,), evenly spread."""
-    kept = thin(frame.points[picked], 0.1)
-    if len(kept) > count:
-        kept = kept[np.linspace(0, len(kept) - 1, count).astype(np.int64)]
+def spread_out(frame: SightedFrame, picked: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Those of the picked obstacles (K,) that stand for all, evenly spread."""
+    return picked[thin(frame.points[picked], SPREAD_M)]
+
+
+def make_template(
+    frame: SightedFrame, spread: NDArray[np.int64], count: int, pivot: NDArray[np.float64]
+) -> Template:
+    """At most ``count`` of obstacles (K,) that are `spread_out`, about a centre (3,), world."""
+    if len(spread) > count:
+        spread = spread[np.linspace(0, len(spread) - 1, count).astype(np.int64)]
+    return replace(whole_template(frame, spread), pivot=pivot)
+
+
+def template_of(frame: SightedFrame, picked: NDArray[np.int64], count: int) -> Template:
+    """At most ``count`` of the picked obstacles (K,), evenly spread, about the centre of all."""
     pivot = frame.world(picked).mean(axis=0)
-    return replace(whole_template(frame, picked[kept]), pivot=pivot)
+    return make_template(frame, spread_out(frame, picked), count, pivot)
 
 
 def whole_template(frame: SightedFrame, picked: NDArray[np.int64]) -> Template:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.landing import land, nearest
+from lidaraccum.pipeline.landing import Lineup
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.suspects import Template
 
@@ -63,14 +63,13 @@ def judge(
 
     ``turns`` (H,), radians a second, are tried with them; straight on when None.
     """
-    total, passed, shown = np.zeros((3, len(velocities)))
-    others = 0
-    for cost, through, hidden in _by_frame(template, velocities, frames, settings, turns):
-        total += cost.mean(axis=1)
-        passed += through.mean(axis=1)
-        shown += np.where(hidden | hidden[0], 0.0, cost[0] - cost).mean(axis=1)
-        others += 1
-    return Verdict(cost=total / others, through=passed / others, shown=shown / others)
+    said = _ask(template, velocities, frames, settings, turns)
+    seen = np.where(said.hidden | said.hidden[:, :1], 0.0, said.cost[:, :1] - said.cost)
+    return Verdict(
+        cost=said.cost.mean(axis=(0, 2)),
+        through=said.through.mean(axis=(0, 2)),
+        shown=seen.mean(axis=(0, 2)),
+    )
 
 
 def judge_points(
@@ -79,35 +78,44 @@ def judge_points(
     frames: Sequence[SightedFrame],
     settings: MotionSettings,
     turns: NDArray[np.float64] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """As `judge`, point by point: costs (H, P) and shares of frames that saw through (H, P)."""
-    said = list(_by_frame(template, velocities, frames, settings, turns))
-    costs, passed, _ = (np.mean(part, axis=0) for part in zip(*said, strict=True))
-    return costs, passed
+) -> NDArray[np.float64]:
+    """The costs of `judge` point by point, (H, P)."""
+    return np.asarray(_ask(template, velocities, frames, settings, turns).cost.mean(axis=0))
 
 
-def _by_frame(
+@dataclass(frozen=True, eq=False)
+class _Answers:
+    """What F frames say of H hypotheses on P points, (F, H, P) each.
+
+    Attributes:
+        cost: As in `Verdict`.
+        through: Whether the frame saw through the place.
+        hidden: Whether the place is hidden from it.
+    """
+
+    cost: NDArray[np.float64]
+    through: NDArray[np.bool_]
+    hidden: NDArray[np.bool_]
+
+
+def _ask(
     template: Template,
     velocities: NDArray[np.float64],
     frames: Sequence[SightedFrame],
     settings: MotionSettings,
     turns: NDArray[np.float64] | None,
-) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]]:
-    """What each other frame says: costs, what it saw through, what is hidden from it, (H, P)."""
+) -> _Answers:
+    """All frames of a window but the cluster's own."""
     turns = np.zeros(len(velocities)) if turns is None else turns
-    gate = settings.truncation_m
-    for frame in frames:
-        if frame.stamp == template.stamp:
-            continue
-        local = land(template, velocities, turns, frame)
-        distance, _ = nearest(local, template.heights, frame, gate)
-        alone = np.isinf(distance)
-        cost = distance / gate
-        cost[alone] = HIDDEN_COST
-        through = np.zeros_like(alone)
-        through[alone] = frame.view.look(local[:, alone].T).through
-        cost[through] = THROUGH_COST
-        yield cost, through, alone & ~through
+    lineup = Lineup.beside(template, frames)
+    local = lineup.land(template, velocities, turns)
+    distance, _ = lineup.nearest(local, template.heights, settings.truncation_m)
+    alone = np.isinf(distance)
+    through = lineup.saw_through(local, alone)
+    cost = distance / settings.truncation_m
+    cost[alone] = HIDDEN_COST
+    cost[through] = THROUGH_COST
+    return _Answers(cost, through, alone & ~through)
 
 
 def slide_velocity(
@@ -180,17 +188,19 @@ def refine_velocities(
     and its distance in time are its weight. ``turns`` (H,), radians a second, stay as they are.
     """
     refined = velocities.copy()
+    lineup = Lineup.beside(template, frames)
+    seconds = lineup.seconds_after(template)[:, None]
+    half = -0.5 * turns * seconds
     for _ in range(steps):
-        asked, weight = np.zeros((2, len(refined))), np.zeros(len(refined))
-        for frame in frames:
-            seconds = frame.stamp - template.stamp
-            if seconds == 0:
-                continue
-            hits, shift = _asked_shifts(template, refined, turns, frame, settings)
-            half = -0.5 * turns * seconds
-            asked[0] += hits * seconds * (np.cos(half) * shift[0] - np.sin(half) * shift[1])
-            asked[1] += hits * seconds * (np.sin(half) * shift[0] + np.cos(half) * shift[1])
-            weight += hits * seconds**2
+        hits, east, north = _asked_shifts(template, refined, turns, lineup, settings)
+        weight = (hits * seconds**2).sum(axis=0)
+        pull = hits * seconds
+        asked = np.array(
+            [
+                (pull * (np.cos(half) * east - np.sin(half) * north)).sum(axis=0),
+                (pull * (np.sin(half) * east + np.cos(half) * north)).sum(axis=0),
+            ]
+        )
         refined[:, :2] += (asked / np.where(weight > 0, weight, 1.0)).T
     return refined
 
@@ -199,16 +209,15 @@ def _asked_shifts(
     template: Template,
     velocities: NDArray[np.float64],
     turns: NDArray[np.float64],
-    frame: SightedFrame,
+    lineup: Lineup,
     settings: MotionSettings,
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Points (H,) with a partner in a frame, and the shift (3, H) they ask for, metres, world."""
-    local = land(template, velocities, turns, frame)
-    distance, partner = nearest(local, template.heights, frame, 2 * settings.truncation_m)
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Points (F, H) with a partner, and the shifts east and north (F, H) they ask for, metres."""
+    local = lineup.land(template, velocities, turns)
+    distance, partner = lineup.nearest(local, template.heights, 2 * settings.truncation_m)
     hit = np.isfinite(distance)
-    if not hit.any():
-        return np.zeros(len(turns), dtype=np.int64), np.zeros((3, len(turns)))
     trust = np.where(hit, 1 / (0.1 + distance), 0.0)
-    lag = frame.near_points.take(partner, axis=0, mode="clip").transpose(2, 0, 1) - local
-    shift = (lag * trust).sum(axis=2) / np.maximum(trust.sum(axis=1), 1e-9)
-    return np.count_nonzero(hit, axis=1), frame.world_from_sensor[:3, :3] @ shift
+    lag = lineup.places_of(partner) - local
+    shift = (lag * trust).sum(axis=3) / np.maximum(trust.sum(axis=2), 1e-9)
+    east, north, _ = lineup.in_world(shift)
+    return np.count_nonzero(hit, axis=2), east, north
