@@ -10,7 +10,9 @@ from torch import nn
 from lidaraccum.model.network import Network
 from lidaraccum.model.precision import has_bfloat16, has_byte_units
 
-LEVELS = 255
+LEVELS = 254
+"""Steps between least and most: one less than a byte has, lest what is rounded up wraps round."""
+
 _LIKE_FLOATS = 0.05
 """A convolution in bytes that is off by more than this share of what it should be is not used."""
 

@@ -14,7 +14,7 @@ from lidaraccum.pipeline.gathering import WHOLE_GROWTH, with_middle
 from lidaraccum.pipeline.hypotheses import propose
 from lidaraccum.pipeline.joining import join_parts
 from lidaraccum.pipeline.motion_settings import LIKELY, MotionSettings
-from lidaraccum.pipeline.objects import Expectation, WindowObject, explain, look_at
+from lidaraccum.pipeline.objects import Expectation, FirstLook, WindowObject, explain, look_at
 from lidaraccum.pipeline.suspects import Lead, Suspect, find_suspects
 
 EXPECTED_M = 1.5
@@ -61,18 +61,19 @@ def find_objects(
     suspects = find_suspects(frames, settings)
     free = _accused(suspects, frames, settings, expected)
     proposed = _Claimed(frames)
-    for lead in leads:
+    looks = [look_at(lead.suspect, frames, settings) for lead in leads]
+    for lead, first in zip(leads, looks, strict=True):
         if proposed.share(lead.suspect) <= CLAIMED_SHARE:
-            found = _explain_lead(lead, frames, settings, expected)
+            found = _explain_lead(lead, frames, settings, expected, first)
             proposed.add(_outlined(found, lead, frames) if found else None)
     movers = _settle(proposed.objects, free, frames, BETTER_SHARE)
-    for lead in leads:
+    for lead, first in zip(leads, looks, strict=True):
         if lead.trust >= LIKELY and _Claimed(frames, movers).share(lead.suspect) <= KNOWN_SHARE:
             trusting = settings.trusting(lead.trust)
-            found = _explain_lead(lead, frames, trusting, expected)
+            found = _explain_lead(lead, frames, trusting, expected, first)
             if found is None:  # its proposer may be right that it moves and wrong how
                 proposals = propose(lead.suspect, suspects, frames, settings)
-                found = explain(lead.suspect, proposals, frames, trusting)
+                found = explain(lead.suspect, proposals, frames, trusting, first=first)
             movers = (
                 _settle([_meant(found, lead, frames)], movers, frames, 1.0) if found else movers
             )
@@ -186,11 +187,12 @@ def _explain_lead(
     frames: Sequence[SightedFrame],
     settings: MotionSettings,
     expected: Sequence[Expectation],
+    first: FirstLook,
 ) -> WindowObject | None:
     known = _expected_velocities(lead.suspect, frames[lead.suspect.frame].stamp, expected)
     proposals = np.concatenate([known, lead.velocities])
     turns = np.concatenate([np.zeros(len(known)), lead.turns])
-    return explain(lead.suspect, proposals, frames, settings, turns)
+    return explain(lead.suspect, proposals, frames, settings, turns, first)
 
 
 def _outlined(found: WindowObject, lead: Lead, frames: Sequence[SightedFrame]) -> WindowObject:
