@@ -5,8 +5,10 @@ from __future__ import annotations
 import torch
 
 from lidaraccum.model.kabsch import invert
-from lidaraccum.model.motion import moments, read, warp
+from lidaraccum.model.motion import MotionMap, Windows, read, warp
 from lidaraccum.model.network import Network
+from lidaraccum.model.settings import NetworkSettings
+from lidaraccum.model.temporal import DecayedDifferences, moments
 
 
 def ramp(size: int = 32) -> torch.Tensor:
@@ -80,3 +82,42 @@ def test_time_is_mixed_as_one_convolution_would(network: Network) -> None:
     three = torch.cat([torch.cat([nothing, own[:-1]]), own, torch.cat([own[1:], nothing])], dim=1)
     expected = stack + torch.relu(block.time(three))
     torch.testing.assert_close(torch.cat(block(stack.split(1))), expected, atol=1e-5, rtol=1e-5)
+
+
+def at(*seconds: float) -> torch.Tensor:
+    """Times of frames, the first the target."""
+    gaps = torch.tensor(seconds)
+    return torch.stack([gaps, gaps.abs(), (gaps == 0).float()], dim=1)
+
+
+def test_differences_from_the_target_fade_with_time() -> None:
+    """Seen through a mixing that hands the differences on."""
+    merge = DecayedDifferences(2)
+    with torch.no_grad():
+        merge.mix.bias.zero_()
+        merge.mix.weight.zero_()
+        merge.mix.weight[:, 2:, 0, 0] = torch.eye(2)
+    still = torch.rand(1, 2, 4, 4)
+    near, far = still + 1.0, still + 3.0
+    torch.testing.assert_close(merge([still] * 3, at(0, 0.1, 0.2)), torch.zeros(1, 2, 4, 4))
+    torch.testing.assert_close(merge([still], at(0)), torch.zeros(1, 2, 4, 4))
+    close = merge([still, near, far], at(0, 0.1, 0.4)).mean()
+    wide = merge([still, near, far], at(0, 0.1, 0.2)).mean()
+    assert 1.0 < float(close) < float(wide) < 2.0
+    close.backward()
+    assert float(merge.log_decay.grad) != 0.0
+
+
+def test_time_put_together_either_way_answers_and_learns() -> None:
+    settings = NetworkSettings(
+        extent_m=16.0, base_widths=(8, 12), motion_widths=(16, 24), temporal="decay"
+    )
+    motion_map = MotionMap(settings)
+    base = [torch.rand(1, 8, 64, 64) for _ in range(3)]
+    poses = torch.eye(4).repeat(3, 1, 1)
+    said = motion_map(
+        base, torch.rand(3, 1, 64, 64), poses, Windows.single(3), (0.0, 0.1, 0.2), 8.0
+    )
+    assert said.shape == (1, 16, 32, 32)
+    said.sum().backward()
+    assert all(one.grad is not None for one in motion_map.merge.parameters())

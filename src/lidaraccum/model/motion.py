@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
 
 import torch
 from torch import nn
 
 from lidaraccum.model.kabsch import exactly
 from lidaraccum.model.settings import NetworkSettings
+from lidaraccum.model.temporal import MERGES, MOMENTS, TemporalBlock, cells_of, moments
 from lidaraccum.model.unet import UNet, linear
 
 _TIMES = 3
 _POINT_PLACE = 4
-_MOMENTS = 4
-_TYPICAL_S = 0.4
-_HARDLY_TAKEN = 0.1
 _TYPICAL_MPS = 10.0
 """Velocities and times are said in these measures."""
 
@@ -67,9 +64,10 @@ class MotionMap(nn.Module):
 
     Base features are warped at full resolution, where a pedestrian's step is still seen, and
     compared at half. Time is mixed by 1 x 1 convolutions over three neighbouring frames between
-    3 x 3 ones over space, which costs a third of 3 x 3 x 3; the maximum over time takes any T.
-    Beside the maximum goes when each place was taken by something movable: the slope of that time
-    over the ground is how slowly and which way it went, across any number of cells.
+    3 x 3 ones over space, which costs a third of 3 x 3 x 3; the maximum over time (or
+    `NetworkSettings.temporal`) takes any T. Beside it goes when each place was taken by something
+    movable: the slope of that time over the ground is how slowly and which way it went, across any
+    number of cells.
 
     Source: the paper, section 3.3; the times are ours.
     """
@@ -81,9 +79,10 @@ class MotionMap(nn.Module):
         nn.init.kaiming_normal_(self.halve.weight, nonlinearity="relu")
         self.clock = nn.Linear(_TIMES, channels)
         self.blocks = nn.ModuleList(
-            _TemporalBlock(channels) for _ in range(settings.temporal_blocks)
+            TemporalBlock(channels) for _ in range(settings.temporal_blocks)
         )
-        self.unet = UNet(channels + _MOMENTS, settings.motion_widths)
+        self.merge = MERGES[settings.temporal](channels)
+        self.unet = UNet(channels + MOMENTS, settings.motion_widths)
 
     def forward(
         self,
@@ -122,7 +121,7 @@ class MotionMap(nn.Module):
             for block in self.blocks:
                 stack = block(stack)
             summary = moments(taken[own], times[own])[None].to(stack[0].dtype)
-            merged.append(torch.cat([reduce(torch.maximum, stack), summary], dim=1))
+            merged.append(torch.cat([self.merge(stack, times[own]), summary], dim=1))
             first += length
         return self.unet(torch.cat(merged).contiguous(memory_format=torch.channels_last))
 
@@ -130,46 +129,6 @@ class MotionMap(nn.Module):
         """(1, C'', S/2, S/2) of warped base features (1, C, S, S), told their time (3,)."""
         bias = self.halve.bias + self.clock(when)
         return torch.relu_(nn.functional.conv2d(base, self.halve.weight, bias, stride=2))
-
-
-def moments(taken: torch.Tensor, times: torch.Tensor) -> torch.Tensor:
-    """(4, H, H): how often places were taken, when on average, spread how far, and at the target.
-
-    Args:
-        taken: (T, H, H) 0..1.
-        times: (T, 3): seconds from the target, their size, 1 for the target.
-    """
-    when = (times[:, 0] / _TYPICAL_S)[:, None, None]
-    total = taken.sum(dim=0) + _HARDLY_TAKEN
-    mean = (taken * when).sum(dim=0) / total
-    spread = ((taken * (when - mean) ** 2).sum(dim=0) / total).sqrt()
-    at_target = (taken * times[:, 2, None, None]).sum(dim=0)
-    return torch.stack([taken.mean(dim=0), mean, spread, at_target])
-
-
-class _TemporalBlock(nn.Module):
-    def __init__(self, channels: int) -> None:
-        super().__init__()
-        self.space = nn.Conv2d(channels, channels, 3, padding=1)
-        self.time = nn.Conv2d(3 * channels, channels, 1)
-
-    def forward(self, stack: Sequence[torch.Tensor]) -> list[torch.Tensor]:
-        """Mix the frames of one window, each (1, C, H, H), in order of time."""
-        own = [torch.relu_(self.space(one)) for one in stack]
-        rows = [_rows(one) for one in own]
-        # As a convolution of three frames side by side, but they are never copied side by side.
-        weights = self.time.weight[:, :, 0, 0].to(rows[0].dtype)
-        before, now, after = torch.split(weights, len(weights), dim=1)
-        mixed = []
-        for place, one in enumerate(stack):
-            cells = nn.functional.linear(rows[place], now, self.time.bias)
-            if place > 0:
-                cells.addmm_(rows[place - 1], before.T)
-            if place + 1 < len(stack):
-                cells.addmm_(rows[place + 1], after.T)
-            cells = torch.relu_(cells) + _rows(one)
-            mixed.append(cells.view(1, *one.shape[2:], -1).permute(0, 3, 1, 2))
-        return mixed
 
 
 def _times(windows: Windows, stamps: tuple[float, ...], device: torch.device) -> torch.Tensor:
@@ -253,7 +212,7 @@ class _Corners:
         A weighted sum of four rows each: several times faster on processors than `grid_sample`,
         for channels lie together in memory.
         """
-        rows = _rows(one).float()
+        rows = cells_of(one).float()
         if rows.shape[1] == 1:
             return (rows[:, 0][self.cell] * self.share).sum(dim=1, keepdim=True).to(one.dtype)
         summed = nn.functional.embedding_bag(
@@ -271,11 +230,6 @@ def _neighbours(at: torch.Tensor, size: int) -> list[tuple[torch.Tensor, torch.T
         inside = cell.clamp(0.0, size - 1.0)
         found.append((inside.int(), share * (inside == cell)))
     return found
-
-
-def _rows(one: torch.Tensor) -> torch.Tensor:
-    """Cells (H * H, C) of a map (1, C, H, H): a view where channels are last in memory."""
-    return one.permute(0, 2, 3, 1).reshape(-1, one.shape[1])
 
 
 class PointHead(nn.Module):

@@ -35,6 +35,8 @@ class NetworkSettings:
         rematch_m: How far a pillar may lie from its partner each time it is matched again, metres.
         temporal_channels: Channels of the temporal block, at half the grid's resolution.
         temporal_blocks: How many of them.
+        temporal: How a window's frames are put together: ``max``, the largest of what they say, or
+            ``decay``, the target and the others' differences from it, the nearer in time the more.
         motion_widths: Channels of the motion U-Net by level, from half resolution on; the first
             is that of the motion features.
         point_channels: Channels of a point's motion features.
@@ -57,6 +59,7 @@ class NetworkSettings:
     rematch_m: tuple[float, ...] = (3.0, 1.5, 0.7)
     temporal_channels: int = 48
     temporal_blocks: int = 2
+    temporal: str = "max"
     motion_widths: tuple[int, ...] = (64, 96, 128)
     point_channels: int = 128
     tube_channels: int = 128
@@ -68,6 +71,8 @@ class NetworkSettings:
         object.__setattr__(self, "motion_widths", tuple(self.motion_widths))
         if not 2 <= len(self.base_widths) <= 5 or not 2 <= len(self.motion_widths) <= 4:
             raise SettingsError("a U-Net has 2 to 5 levels (base), 2 to 4 (motion)")
+        if self.temporal not in ("max", "decay"):
+            raise SettingsError(f"temporal is max or decay, not {self.temporal!r}")
         if self.lowest_m >= self.highest_m:
             raise SettingsError("lowest_m must be below highest_m")
         self.cells(self.extent_m)
