@@ -103,9 +103,9 @@ def test_differences_from_the_target_fade_with_time() -> None:
     torch.testing.assert_close(merge([still], at(0)), torch.zeros(1, 2, 4, 4))
     close = merge([still, near, far], at(0, 0.1, 0.4)).mean()
     wide = merge([still, near, far], at(0, 0.1, 0.2)).mean()
-    assert 1.0 < float(close) < float(wide) < 2.0
+    assert 1.0 < close.item() < wide.item() < 2.0
     close.backward()
-    assert float(merge.log_decay.grad) != 0.0
+    assert merge.log_decay.grad.item() != 0.0
 
 
 def test_time_put_together_either_way_answers_and_learns() -> None:
@@ -115,9 +115,8 @@ def test_time_put_together_either_way_answers_and_learns() -> None:
     motion_map = MotionMap(settings)
     base = [torch.rand(1, 8, 64, 64) for _ in range(3)]
     poses = torch.eye(4).repeat(3, 1, 1)
-    said = motion_map(
-        base, torch.rand(3, 1, 64, 64), poses, Windows.single(3), (0.0, 0.1, 0.2), 8.0
-    )
+    presence, stamps = torch.rand(3, 1, 64, 64), (0.0, 0.1, 0.2)
+    said = motion_map(base, presence, poses, Windows.single(3), stamps, 8.0)
     assert said.shape == (1, 16, 32, 32)
     said.sum().backward()
     assert all(one.grad is not None for one in motion_map.merge.parameters())
