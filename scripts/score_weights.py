@@ -1,7 +1,7 @@
 """Scores weights on the simulator's test set or a labelled drive, the network doing it all itself.
 
 Usage: score_weights.py WEIGHTS [--windows 40] [--extent 64] [--threads 2]
-                        [--drive DIR [--classed]]
+                        [--drive DIR [--classed]] [--lift 0.0]
 
 Prints two Markdown tables: the whole network beside the paper's figures (its own poses, masks,
 objects and motions; five frames, the first the target, ground included, sweeps compensated), and
@@ -28,6 +28,7 @@ from lidaraccum.training.end_to_end import EndToEnd
 from lidaraccum.training.exam import recorded_windows, simulated_windows
 from lidaraccum.training.scores import scores_of
 from lidaraccum.training.stages import StageScores, score_stages
+from lidaraccum.training.window import Batch
 
 STAGES = (
     "foreground_iou", "foreground_precision", "foreground_recall", "motion_iou",
@@ -50,6 +51,11 @@ def whole_row(name: str, parts: list[StageScores]) -> Row:
     return replace(row_of(name, scores), seconds=float("nan"))
 
 
+def lifted(batch: Batch, metres: float) -> Batch:
+    """The batch as it would be were the ground found so much too low."""
+    return replace(batch, frames=replace(batch.frames, height=batch.frames.height + metres))
+
+
 def main() -> None:
     """Parse, score, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -59,6 +65,7 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--drive", type=Path)
     parser.add_argument("--classed", action="store_true", help="leave out points of no class")
+    parser.add_argument("--lift", type=float, default=0.0, help="tell heights so much too high, m")
     options = parser.parse_args()
     torch.set_num_threads(options.threads)
     network = load_network(options.weights)
@@ -68,6 +75,7 @@ def main() -> None:
         if options.drive
         else simulated_windows(*what)
     )
+    batches = (lifted(batch, options.lift) for batch in batches)
     began = time.monotonic()
     with torch.no_grad():
         parts = [score_stages(network, batch) for batch in tqdm(batches, total=options.windows)]

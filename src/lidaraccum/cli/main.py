@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import click
 
 import lidaraccum
@@ -14,6 +16,9 @@ from lidaraccum.cli.info import info
 from lidaraccum.cli.mesh import mesh
 from lidaraccum.cli.simulate import simulate
 from lidaraccum.cli.train import train
+
+# Before NumPy is opened: its products are of small matrices here, and threads only wait in them.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})

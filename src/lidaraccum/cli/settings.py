@@ -78,11 +78,15 @@ def accumulate_settings(params: Mapping[str, Any]) -> AccumulateSettings:
 
 
 def chosen_processes(params: Mapping[str, Any], frames: int) -> int:
-    """As many processes as asked for, or as pay for so many frames."""
+    """As many processes as asked for, or as pay for so many frames.
+
+    Finding movers keeps one core busy, with the network nearly two.
+    """
     from lidaraccum.registration.apart import is_worthwhile
 
     asked: int | None = params["processes"]
-    return asked or (2 if is_worthwhile(frames) else 1)
+    busy = 2 if params["method"] == "network" else 1
+    return asked or (2 if is_worthwhile(frames, busy) else 1)
 
 
 def reported(params: Mapping[str, Any]) -> dict[str, Any]:

@@ -25,10 +25,10 @@ WORTH_FRAMES = 10
 """Fewer frames are registered before another process has started."""
 
 
-def is_worthwhile(frames: int) -> bool:
-    """Whether a process of its own pays for so many frames here."""
+def is_worthwhile(frames: int, busy: int) -> bool:
+    """Whether a process of its own pays for so many frames where so many threads are busy."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return frames >= WORTH_FRAMES and (cores or 1) > 1
+    return frames >= WORTH_FRAMES and (cores or 1) > busy
 
 
 class Registrar:
