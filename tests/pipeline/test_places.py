@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lidaraccum.pipeline.places import CELL_M, REMEMBERED_FRAMES, Places, cell_keys, cells_of
+from lidaraccum.geometry.voxel import voxel_cells
+from lidaraccum.pipeline.places import CELL_M, REMEMBERED_FRAMES, Places, cell_keys
 
 HERE = np.array([[0.1, 0.1]])
 
@@ -59,5 +60,5 @@ def test_what_nobody_saw_for_long_is_forgotten() -> None:
 
 def test_cells_are_found_again_by_their_number() -> None:
     places = np.random.default_rng(0).uniform(-5000, 5000, (1000, 2))
-    x, y = cells_of(cell_keys(places))
+    x, y, _ = voxel_cells(cell_keys(places)).T
     np.testing.assert_array_equal(np.column_stack([x, y]), np.floor(places / CELL_M))

@@ -8,6 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 
+def centres(*, reach_m: float, cell_m: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where the cells of a table have their centres, metres: x and y (G, G)."""
+    along = (np.arange(int(2 * reach_m / cell_m)) + 0.5) * cell_m - reach_m
+    x, y = np.meshgrid(along, along, indexing="ij")
+    return x, y
+
+
 def interpolated(
     table: NDArray[Any], x: NDArray[Any], y: NDArray[Any], *, reach_m: float, cell_m: float
 ) -> NDArray[Any]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from lidaraccum.geometry.grid import interpolated
+from lidaraccum.geometry.grid import centres, interpolated
 from lidaraccum.geometry.rigid import Pose, transform
 
 REACH_M = 64.0
@@ -91,29 +91,30 @@ def level_by_ground(points: NDArray[Any]) -> tuple[Ground, NDArray[np.float64]]:
     if deep.any():
         below = level[deep]
         flat = level[np.abs(level[:, 2]) < FLAT_M]
-        ground = _look_up(_counts(below) >= ROAD_POINTS, below)
-        ground &= ~_under_the_road(below, flat, float(level_from_sensor[2, 3]))
-        low = np.fmin(low, _lowest(below[ground]))
+        is_ground = _are_ground(below, flat, float(level_from_sensor[2, 3]))
+        low = np.fmin(low, _lowest(below[is_ground]))
     return Ground(level_from_sensor, _follow(_without_strays(low))), level
 
 
-def _under_the_road(
+def _are_ground(
     deep: NDArray[np.float64], flat: NDArray[np.float64], mount_m: float
 ) -> NDArray[np.bool_]:
-    """Deep points (N, 3) that only a ray through the road could have met: mirror images, say.
+    """Which of the deep points (N, 3) are neither strays nor met through the road: mirror images.
 
     The road (points near its plane, (M, 3)) must have been seen where the ray crosses the plane. A
     ditch or a slope beyond the road's edge is not under it: half way from there to the point lies
     nothing of the road, but much that is as deep.
     """
+    counts = _counts(deep)
+    has_company = _look_up(counts >= ROAD_POINTS, deep)
     if mount_m < LEAST_MOUNT_M:
-        return np.zeros(len(deep), dtype=bool)
+        return has_company
     road = _counts(flat) >= ROAD_POINTS
-    ditch = (_counts(deep) >= DITCH_POINTS) & ~road
+    ditch = (counts >= DITCH_POINTS) & ~road
     crossing = mount_m / (mount_m - deep[:, 2])
     at_crossing = _look_up(road, deep[:, :2] * crossing[:, None])
     half_way = _look_up(ditch, deep[:, :2] * (0.5 + 0.5 * crossing)[:, None])
-    return at_crossing & ~half_way
+    return has_company & ~(at_crossing & ~half_way)
 
 
 def _look_up(cells: NDArray[np.bool_], xy: NDArray[Any]) -> NDArray[np.bool_]:
@@ -159,13 +160,9 @@ def _without_strays(low: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.where(low < beside - STRAY_M, np.nan, low), dtype=np.float64)
 
 
-def _centres() -> NDArray[np.float64]:
-    return (np.arange(_CELLS, dtype=np.float64) + 0.5) * CELL_M - REACH_M
-
-
 def _fit_plane(low: NDArray[np.float64]) -> NDArray[np.float64]:
     """(a, b, c) of z = a x + b y + c, through as many cells' lowest points as can be."""
-    x, y = np.meshgrid(_centres(), _centres(), indexing="ij")
+    x, y = centres(reach_m=REACH_M, cell_m=CELL_M)
     near = (np.hypot(x, y) < PLANE_REACH_M) & ~np.isnan(low)
     if np.count_nonzero(near) < 6:
         floor = np.nanmin(low) if not np.isnan(low).all() else 0.0

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from lidaraccum.geometry.grid import interpolated
+from lidaraccum.geometry.grid import centres, interpolated
 from lidaraccum.geometry.ground import estimate_ground
 from lidaraccum.geometry.rigid import transform
 
@@ -73,16 +73,9 @@ def estimate_terrain(points: NDArray[Any]) -> Terrain:
 def _above_rough_ground(low: NDArray[np.float64], points: NDArray[Any]) -> NDArray[np.float64]:
     """How far above the ground, as `ground` has it, cells begin (G, G), metres."""
     rough = estimate_ground(points)
-    x, y = _middles()
+    x, y = centres(reach_m=REACH_M, cell_m=CELL_M)
     cells = np.column_stack([x.ravel(), y.ravel(), np.where(np.isfinite(low), low, 0.0).ravel()])
     return rough.height_above(transform(rough.level_from_sensor, cells)).reshape(low.shape)
-
-
-def _middles() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where cells have their middles: x and y (G, G), metres."""
-    middle = (np.arange(_CELLS) + 0.5) * CELL_M - REACH_M
-    x, y = np.meshgrid(middle, middle, indexing="ij")
-    return x, y
 
 
 def _road(low: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -90,7 +83,7 @@ def _road(low: NDArray[np.float64]) -> NDArray[np.float64]:
 
     What lies off the plane counts less and less. NaN too where few cells are known.
     """
-    x, y = _middles()
+    x, y = centres(reach_m=REACH_M, cell_m=CELL_M)
     plane = np.full(low.shape, np.nan)
     near = np.hypot(x, y) < ROAD_REACH_M
     used = near & np.isfinite(low)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import islice
 from typing import TypeVar
 
 Item = TypeVar("Item")
@@ -32,4 +33,4 @@ def ahead(items: Iterable[Item]) -> Iterator[Item]:
 
 def _next(source: Iterator[Item]) -> list[Item]:
     """The next item alone; none when there is no more, for a future holds no StopIteration."""
-    return [item for _, item in zip(range(1), source, strict=False)]
+    return list(islice(source, 1))

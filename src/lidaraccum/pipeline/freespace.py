@@ -170,11 +170,8 @@ class SightedFrame:
         """When after the stamp the sweep passed points (N, 3), sensor coordinates: (N,) seconds."""
         if not self.is_timed:
             return np.zeros(len(points))
-        return self.seconds_toward(points[:, 0], points[:, 1])
-
-    def seconds_toward(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-        """As `seconds_at` where `is_timed`, for x and y (...) each: (...) seconds."""
-        return self.seconds_by_azimuth[azimuth_bins(x - self.viewpoint[0], y - self.viewpoint[1])]
+        x, y = points[:, 0] - self.viewpoint[0], points[:, 1] - self.viewpoint[1]
+        return self.seconds_by_azimuth[azimuth_bins(x, y)]
 
     @cached_property
     def is_timed(self) -> bool:
@@ -197,6 +194,12 @@ class SightedFrame:
         nearest = np.where(about[after] - wanted < wanted - about[before], after, before)
         return np.asarray(means[nearest])
 
+    def in_clusters_of(self, picked: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Which obstacles (M,) are in the clusters of some of them (K,)."""
+        is_theirs = np.zeros(len(self.segment_sizes), dtype=np.bool_)
+        is_theirs[self.segments[picked]] = True
+        return is_theirs[self.segments]
+
     def about(self, centre: NDArray[np.float64], reach_m: float) -> NDArray[np.int64]:
         """The obstacles (K,) in the level square so far about a place (3,) in the world."""
         here = self.sensor_from_world[:3] @ np.append(centre, 1.0)
@@ -205,7 +208,8 @@ class SightedFrame:
         near &= (y > north - reach_m) & (y < north + reach_m)
         return np.flatnonzero(near)
 
-    def world_of_near(self) -> NDArray[np.float64]:
+    @cached_property
+    def near_world(self) -> NDArray[np.float64]:
         """Obstacles and low points in the world, (M + L, 3) metres."""
         return rigid.transform(self.world_from_sensor, self.near_points)
 

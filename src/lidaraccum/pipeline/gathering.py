@@ -207,9 +207,7 @@ def with_middle(
 
 def _others_of_clusters(frame: SightedFrame, picked: NDArray[np.int64]) -> NDArray[np.int64]:
     """The obstacles of the picked ones' clusters that are not picked themselves."""
-    cluster = np.zeros(len(frame.segment_sizes), dtype=np.bool_)
-    cluster[frame.segments[picked]] = True
-    near = cluster[frame.segments]
+    near = frame.in_clusters_of(picked)
     near[picked] = False
     return np.flatnonzero(near)
 

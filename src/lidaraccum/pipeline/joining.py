@@ -82,9 +82,7 @@ def _touch(part: WindowObject, whole: WindowObject, frames: Sequence[SightedFram
     for frame in frames:
         if frame.index in part.picked and frame.index in whole.picked:
             some, others = part.picked[frame.index], whole.picked[frame.index]
-            clusters = np.zeros(len(frame.segment_sizes), dtype=np.bool_)
-            clusters[frame.segments[others]] = True
-            if clusters[frame.segments[some]].any():
+            if frame.in_clusters_of(others)[some].any():
                 return True
             if _are_near(frame.points[some], frame.points[others]):
                 return True

@@ -123,4 +123,4 @@ class NetworkAdvice:
 def _standing(frame: SightedFrame) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Rows (K,) of what stands on the ground, near enough to be looked at, and places (K, 2)."""
     rows = np.concatenate([frame.rows, frame.low_rows])
-    return rows, frame.world_of_near()[:, :2]
+    return rows, frame.near_world[:, :2]

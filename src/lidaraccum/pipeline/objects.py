@@ -213,7 +213,7 @@ def _all_goes_along(
     own = frames[suspect.frame]
     about = own.about(suspect.centre, ABOUT_M)
     stands = (own.met[about] > 0) & (own.through[about] == 0)
-    about = about[stands & ~np.isin(own.segments[about], own.segments[suspect.picked])]
+    about = about[stands & ~own.in_clusters_of(suspect.picked)[about]]
     if len(about) < TEMPLATE_POINTS:
         return False
     template = template_of(own, about, TEMPLATE_POINTS)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lidaraccum.geometry.voxel import Keys, voxel_keys
+
 CELL_M = 0.5
 """Places are cells so wide, seen from above."""
 
@@ -15,8 +17,6 @@ no less than this: what is near shows its shape, in every point."""
 
 REMEMBERED_FRAMES = 100
 """A cell that no frame saw for so long is forgotten."""
-
-_WIDTH = 1 << 31
 
 
 class Places:
@@ -64,13 +64,6 @@ def _sums(place: NDArray[np.int64], values: NDArray[np.float64]) -> NDArray[np.f
     return np.bincount(place, values).astype(np.float64, copy=False)
 
 
-def cell_keys(places: NDArray[np.float64]) -> NDArray[np.int64]:
-    """A number (N,) for the cell of each place (N, 2), metres; NumPy is slow at pairs."""
-    x, y = np.floor(places.T * (1.0 / CELL_M)).astype(np.int64)
-    return x * _WIDTH + y
-
-
-def cells_of(keys: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The cells' numbers along x and y (N,) again."""
-    x = (keys + _WIDTH // 2) // _WIDTH
-    return x, keys - x * _WIDTH
+def cell_keys(places: NDArray[np.float64]) -> Keys:
+    """A number (N,) for the cell of each place (N, 2), metres, sorted by x, then y."""
+    return voxel_keys(np.column_stack([places, np.zeros(len(places))]), CELL_M)

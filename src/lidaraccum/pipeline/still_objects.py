@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.pipeline.object_ids import ObjectIds
-from lidaraccum.pipeline.places import cell_keys, cells_of
+from lidaraccum.pipeline.places import cell_keys
 
 LEAST_SHARE = 0.1
 """A cluster is the object that has most of its cells, if that is at least this share of them."""
@@ -18,16 +18,14 @@ MOST_OBJECTS = 4000
 MOST_CELLS = 400
 """So many objects are remembered, the latest seen, with so many cells each: some 100 MB."""
 
-Cell = tuple[int, int]
-
 
 class StillObjects:
     """Whose place is whose. What stands is where it was; what moves takes its place along."""
 
     def __init__(self, ids: ObjectIds) -> None:
         self._ids = ids
-        self._owner: dict[Cell, int] = {}
-        self._cells: OrderedDict[int, set[Cell]] = OrderedDict()
+        self._owner: dict[int, int] = {}
+        self._cells: OrderedDict[int, set[int]] = OrderedDict()
 
     def name(self, clusters: Sequence[NDArray[np.float64]]) -> list[int]:
         """Ids of one frame's clusters, each of points (K, 2), metres, world.
@@ -51,14 +49,14 @@ class StillObjects:
             del self._owner[cell]
         self._claim(instance, _cells(points))
 
-    def _known(self, cells: set[Cell], given: set[int]) -> int | None:
+    def _known(self, cells: set[int], given: set[int]) -> int | None:
         votes = Counter(self._owner[cell] for cell in cells if cell in self._owner)
         for name, count in votes.most_common():
             if name not in given and count >= LEAST_SHARE * len(cells):
                 return name
         return None
 
-    def _claim(self, name: int, cells: set[Cell]) -> None:
+    def _claim(self, name: int, cells: set[int]) -> None:
         own = self._cells.setdefault(name, set())
         self._cells.move_to_end(name)
         fresh = not own  # what parts from another takes its own places with it
@@ -68,7 +66,7 @@ class StillObjects:
             if cell not in self._owner or fresh:
                 self._give(cell, name)
 
-    def _give(self, cell: Cell, name: int) -> None:
+    def _give(self, cell: int, name: int) -> None:
         before = self._owner.get(cell)
         if before is not None:
             self._cells[before].discard(cell)
@@ -82,6 +80,5 @@ class StillObjects:
                 del self._owner[cell]
 
 
-def _cells(points: NDArray[np.float64]) -> set[Cell]:
-    x, y = cells_of(np.unique(cell_keys(points)))
-    return set(zip(x.tolist(), y.tolist(), strict=True))
+def _cells(points: NDArray[np.float64]) -> set[int]:
+    return set(cell_keys(points).tolist())

@@ -88,8 +88,9 @@ class Registrar:
     def _receive(self, frame: Frame) -> RegisteredFrame:
         registered = self._answer()
         assert registered is not None
-        points = registered.frame.points if registered.deskewed else frame.points
-        return replace(registered, frame=frame.with_points(points))
+        if registered.deskewed:
+            frame = frame.with_points(registered.frame.points)
+        return replace(registered, frame=frame)
 
     def _answer(self) -> RegisteredFrame | None:
         """What comes next: a frame, or nothing more."""
