@@ -94,6 +94,20 @@ def test_thin_mirror_images_dig_no_hole() -> None:
     assert np.abs(above[on_road(road)]).max() < 0.3
 
 
+def test_mirror_images_of_a_dense_sensor_dig_no_hole() -> None:
+    """Twelve times the rays bring twelve times the images: few still beside the road's."""
+    rng = np.random.default_rng(0)
+    mount_m = 1.8
+    xy = rng.uniform(-30, 30, (200_000, 2))
+    hidden = (xy[:, 0] > 3) & (xy[:, 0] < 12) & (xy[:, 1] < -2) & (xy[:, 1] > -14)
+    road = np.column_stack([xy[~hidden], rng.normal(-mount_m, 0.02, np.count_nonzero(~hidden))])
+    images = rng.uniform([3, -14, -4 - mount_m], [12, -2, -0.4 - mount_m], (130, 3))
+    ground = estimate_ground(np.concatenate([road, images]))
+    under = np.column_stack([xy[hidden], np.full(np.count_nonzero(hidden), -mount_m)])
+    above = ground.height_above(rigid.transform(ground.level_from_sensor, under))
+    assert np.abs(above).max() < 0.3
+
+
 def test_cars_in_a_row_that_hide_the_ground_do_not_raise_it() -> None:
     """Of the second row only upper parts are seen, and nothing of what it stands on."""
     rng = np.random.default_rng(0)

@@ -40,6 +40,9 @@ FLAT_M = 0.3
 ROAD_POINTS, DITCH_POINTS = 3, 8
 """A cell with so many of them holds the road; with so many deeper ones, and no road, a ditch.
 Fewer deeper ones than the first number are strays."""
+THIN_SHARE = 0.1
+RING_M = 4.0
+"""So are fewer than this share of what cells of the road hold that are as far away."""
 LEAST_MOUNT_M = 0.5
 """Where the sensor seems lower than this above the road, its coordinates start elsewhere."""
 
@@ -105,16 +108,24 @@ def _are_ground(
     ditch or a slope beyond the road's edge is not under it: half way from there to the point lies
     nothing of the road, but much that is as deep.
     """
-    counts = _counts(deep)
-    has_company = _look_up(counts >= ROAD_POINTS, deep)
+    counts, on_road = _counts(deep), _counts(flat)
+    thin = THIN_SHARE * _usual(on_road)
+    has_company = _look_up((counts >= ROAD_POINTS) & (counts >= thin), deep)
     if mount_m < LEAST_MOUNT_M:
         return has_company
-    road = _counts(flat) >= ROAD_POINTS
-    ditch = (counts >= DITCH_POINTS) & ~road
+    road = on_road >= ROAD_POINTS
+    ditch = (counts >= DITCH_POINTS) & (counts >= thin) & ~road
     crossing = mount_m / (mount_m - deep[:, 2])
     at_crossing = _look_up(road, deep[:, :2] * crossing[:, None])
     half_way = _look_up(ditch, deep[:, :2] * (0.5 + 0.5 * crossing)[:, None])
     return has_company & ~(at_crossing & ~half_way)
+
+
+def _usual(counts: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Mean count (G, G) of cells that hold any, for each cell of those as far from the sensor."""
+    ring = (np.hypot(*centres(reach_m=REACH_M, cell_m=CELL_M)) / RING_M).astype(np.int64).ravel()
+    taken = np.bincount(ring, counts.ravel() > 0)
+    return (np.bincount(ring, counts.ravel()) / np.maximum(taken, 1))[ring].reshape(counts.shape)
 
 
 def _look_up(cells: NDArray[np.bool_], xy: NDArray[Any]) -> NDArray[np.bool_]:
