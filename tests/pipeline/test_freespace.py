@@ -48,3 +48,21 @@ def test_obstacles_stand_on_the_ground_and_away_from_the_carrier(busy_street: An
     assert np.linalg.norm(frame.points, axis=1).min() > BALANCED.min_range_m - 0.01
     assert (busy_street.on[0][frame.low_rows] >= 0).all()
     assert not set(frame.rows.tolist()) & set(frame.low_rows.tolist())
+
+
+def test_what_stands_outlasts_what_passes(busy_street: Any) -> None:
+    frames = [SightedFrame(registered, BALANCED) for registered in busy_street.frames]
+    for frame in frames:
+        for other in frames:
+            if other is not frame:
+                frame.watch(other)
+    middle = frames[4]
+    everything = np.arange(len(middle.rows))
+    stands = busy_street.on[4][middle.rows] == 0
+    met_by_all = middle.met == len(frames) - 1
+    car = busy_street.on[4][middle.rows] == 1
+    passing_s = (4.2 + 0.3) / 8.0
+    outlasts = middle.outlasts(everything, passing_s)
+    assert not outlasts[car].any()
+    assert outlasts[stands & met_by_all].mean() > 0.98
+    assert not middle.outlasts(everything, 0.8).any(), "nobody watched for longer than that"

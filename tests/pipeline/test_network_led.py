@@ -234,6 +234,31 @@ class StoppingOracle(Oracle):
         return FrameReading(said.foreground, moves, said.offset)
 
 
+class GreedyOracle(Oracle):
+    """Takes all that stands beside a mover for a part of it."""
+
+    def _say(self, frame: Frame, world_from_sensor: np.ndarray, then: float) -> FrameReading:
+        said = super()._say(frame, world_from_sensor, then)
+        world = rigid.transform(world_from_sensor, frame.points)
+        (mover,) = self.movers
+        middle = (mover.place(frame.stamp) + np.array(mover.size) / 2)[:2]
+        goal = (mover.place(then) + np.array(mover.size) / 2)[:2]
+        beside = (np.linalg.norm(world[:, :2] - middle, axis=1) < 2.2) & (world[:, 2] > 0.1)
+        sure, offset = said.dynamic.copy(), said.offset.copy()
+        sure[beside], offset[beside] = 1.0, goal - world[beside, :2]
+        return FrameReading(np.maximum(said.foreground, sure), sure, offset)
+
+
+def test_what_stands_where_a_mover_passes_does_not_go_along(look: Any, new_mover: Any) -> None:
+    cyclist = new_mover(low=(1.0, 3.3, 0.0), size=(1.8, 0.6, 1.7), velocity=(4.5, 0.0, 0.0))
+    street = look([cyclist], count=34)
+    frames = perceive(street, GreedyOracle(street, [cyclist]))
+    said = np.concatenate([frame.label == MOVING for frame in frames])
+    on = np.concatenate(street.on) == 1
+    assert said[on].mean() > 0.97
+    assert (said & ~on).sum() < 0.01 * on.sum()
+
+
 @pytest.mark.parametrize("count", [1, 2, 3, 6])
 def test_short_drives_leave_whole(look: Any, new_mover: Any, count: int) -> None:
     walker = new_mover(low=(9.0, 3.0, 0.0), size=(0.5, 0.5, 1.75), velocity=(0.0, -1.6, 0.0))

@@ -26,6 +26,9 @@ FARTHEST_ECHO_M = 1_000.0
 
 AZIMUTH_BINS = 360
 
+OUTLASTS_BY = 2
+"""So many frames may have met something beside a mover where it was not."""
+
 LOW_SHARE = 0.4
 """Points above this share of the least height count as partners and join what stands on them."""
 
@@ -90,6 +93,7 @@ class SightedFrame:
         self.segment_sizes = np.bincount(self.segments)
         self.through = np.zeros(len(self.rows), dtype=np.int16)
         self.met = np.zeros(len(self.rows), dtype=np.int16)
+        self._watched_at: list[float] = []
 
     @property
     def index(self) -> int:
@@ -224,6 +228,18 @@ class SightedFrame:
         sighting = self.view.look(other._columns, sensor_from_other)
         other.through += sighting.through
         other.met += sighting.met
+        other._watched_at.append(self.stamp)
+
+    def outlasts(self, picked: NDArray[np.int64], seconds: float) -> NDArray[np.bool_]:
+        """Which of some obstacles (K,) are at a place where something was for longer than that.
+
+        Nobody saw through it, and more frames met something there, by `OUTLASTS_BY`, than any such
+        time about this frame's stamp has. What moves is gone when it has gone its length.
+        """
+        at = np.array(self._watched_at) - self.stamp
+        starts = np.append(at[(at <= 0) & (at >= -seconds)], 0.0)[:, None]
+        most = ((at >= starts) & (at <= starts + seconds)).sum(axis=1).max()
+        return (self.through[picked] == 0) & (self.met[picked] > most + OUTLASTS_BY)
 
 
 def _picked(points: NDArray[np.float32], rows: NDArray[np.int64]) -> NDArray[np.float64]:

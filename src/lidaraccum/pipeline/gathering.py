@@ -36,6 +36,15 @@ STANDING_MARGIN = 0.1
 """With more than this share of points that were met and never seen through, each is asked whether
 standing costs it so much less than moving."""
 
+PASSING_M = 0.3
+OUTLASTING_SHARE = 0.5
+"""A mover is at a place while it goes its length and this much more. What was there for longer
+stands beside it; but where more than this share of it would, its length or speed is wrong."""
+
+STRAY_SHARE = 0.02
+STRAY_GAP_M = 1.0
+"""Parts of a mover with less than this share of its points, so far from the others, are not its."""
+
 
 def gather(
     suspect: Suspect,
@@ -164,6 +173,27 @@ def without_standing(
         if len(mine):
             kept[frame.index] = mine
     return kept
+
+
+def seconds_at_place(points: NDArray[np.float64], velocity: NDArray[np.float64]) -> float:
+    """How long a mover of such points (N, 3), world, and velocity (3,) is at a place."""
+    speed = float(np.linalg.norm(velocity))
+    length = float(np.ptp(points[:, :2] @ velocity[:2])) / speed
+    return (length + PASSING_M) / speed
+
+
+def without_outlasting(
+    frame: SightedFrame, picked: NDArray[np.int64], seconds: float
+) -> NDArray[np.int64]:
+    """A mover's obstacles (K,) in a frame less what was there longer than it can have been."""
+    stands = frame.outlasts(picked, seconds)
+    return picked if stands.mean() > OUTLASTING_SHARE else picked[~stands]
+
+
+def without_strays(frame: SightedFrame, picked: NDArray[np.int64]) -> NDArray[np.int64]:
+    """A mover's obstacles (K,) in a frame less the few that lie apart from all others."""
+    part = connected_cells(frame.points[picked], STRAY_GAP_M)
+    return picked[np.bincount(part)[part] >= STRAY_SHARE * len(picked)]
 
 
 def with_middle(

@@ -12,6 +12,12 @@ from lidaraccum.geometry import rigid
 from lidaraccum.pipeline.association import Track
 from lidaraccum.pipeline.courses import course, turned
 from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.gathering import (
+    PASSING_M,
+    seconds_at_place,
+    without_outlasting,
+    without_strays,
+)
 from lidaraccum.pipeline.shape import ObjectShape
 
 LOW_REACH_M = 0.2
@@ -108,10 +114,12 @@ def paint_mover(track: Track, frame: SightedFrame, canvas: Canvas, box_growth: f
     """Give a mover its points of a frame, from windows or, for a while, from its shape alone."""
     picked = canvas.free(track.picked.get(frame.index, _NONE))
     if len(picked):
+        seconds = _seconds_at_place(track, frame, picked)
+        picked = without_strays(frame, without_outlasting(frame, picked, seconds))
         _follow(track, frame, picked)
-        canvas.paint(
-            track, np.union1d(picked, canvas.free(_in_box(track, frame, box_growth))), MOVING
-        )
+        inside = canvas.free(_in_box(track, frame, box_growth))
+        inside = inside[~frame.outlasts(inside, seconds)]
+        canvas.paint(track, np.union1d(picked, inside), MOVING)
         _take_close(track, frame, canvas)
         return
     if track.shape is None or frame.index - track.last_index > LOST_FRAMES:
@@ -171,6 +179,14 @@ def _note(track: Track, frame: SightedFrame, pose: rigid.Pose, points: int) -> N
     track.last_index, track.last_stamp = frame.index, frame.stamp
     track.points = points
     track.most_points = max(track.most_points, points)
+
+
+def _seconds_at_place(track: Track, frame: SightedFrame, picked: NDArray[np.int64]) -> float:
+    """How long a mover is at a place: what it has shown or, at first, its obstacles (K,) tell."""
+    velocity = track.velocities[frame.index]
+    if track.shape is None:
+        return seconds_at_place(frame.world(picked), velocity)
+    return (track.shape.length_m + PASSING_M) / float(np.linalg.norm(velocity))
 
 
 def _in_box(track: Track, frame: SightedFrame, growth: float) -> NDArray[np.int64]:

@@ -72,6 +72,12 @@ class ObjectShape:
         """Nothing of it is farther from its origin, seen from above."""
         return self._radius_m
 
+    @property
+    def length_m(self) -> float:
+        """Longer side, seen from above, of the box about all but the outermost of it."""
+        low, high = self._box
+        return float((high - low)[:2].max())
+
     def _take(self, points: NDArray[np.float64]) -> None:
         self._points = points
         self._columns = np.ascontiguousarray(points.T)

@@ -15,6 +15,7 @@ from lidaraccum.geometry.clustering import dense_groups
 from lidaraccum.model.reading import ObjectReading, WindowReading
 from lidaraccum.pipeline.courses import turned
 from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.gathering import seconds_at_place, without_outlasting
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.suspects import Lead, Suspect
 
@@ -26,6 +27,9 @@ RADIUS_M = 0.4
 NEIGHBOURS = 5
 """DBSCAN of points at the centres they point to, seen from above; METHOD.md section 4. Many points
 to one centre make one cell."""
+
+SLOWEST_MPS = 0.5
+"""What seems to go slower is not asked how long it was where."""
 
 LONGEST_M = 25.0
 """Nothing on a road is longer."""
@@ -167,11 +171,24 @@ def _groups(
     for number in range(int(cluster.max(initial=-1)) + 1):
         own = cluster == number
         group = {int(at): obstacle[own & (place == at)] for at in np.unique(place[own]).tolist()}
+        group = _passing(group, frames)
         most = max(len(rows) for rows in group.values())
         if most >= settings.min_points and _extent(group, frames) < LONGEST_M:
             groups.append(group)
     groups.sort(key=lambda group: -sum(map(len, group.values())))
     return groups[:MOST_TUBES]
+
+
+def _passing(group: _Group, frames: Sequence[SightedFrame]) -> _Group:
+    """The group without what was at its place longer than anything so fast and long can be."""
+    velocity = _centroid_velocity(group, frames)
+    if not np.linalg.norm(velocity) > SLOWEST_MPS:
+        return group
+    place = max(group, key=lambda place: len(group[place]))
+    seconds = seconds_at_place(frames[place].world(group[place]), velocity)
+    return {
+        place: without_outlasting(frames[place], picked, seconds) for place, picked in group.items()
+    }
 
 
 def _extent(group: _Group, frames: Sequence[SightedFrame]) -> float:
