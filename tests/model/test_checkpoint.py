@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -33,6 +35,23 @@ def test_the_network_comes_back_with_its_settings_and_answers(
     assert torch.equal(one.foreground, two.foreground)
     assert read_tensors(path)[1]["steps"] == "7"
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
+
+
+def test_a_file_from_before_a_setting_is_read_as_it_was_made(
+    network: Network, tmp_path: Path
+) -> None:
+    """Older networks learned on all points of a pillar."""
+    path = tmp_path / "weights.safetensors"
+    save_network(network, path)
+    tensors, metadata = read_tensors(path)
+    settings = json.loads(metadata["settings"])
+    del settings["pillar_points"]
+    write_tensors(tensors, metadata | {"settings": json.dumps(settings)}, path)
+    assert load_network(path).settings.pillar_points == 0
+    asked = replace(network.settings, pillar_points=5, ego_pillars=9, point_hidden=99)
+    again = load_network(path, effort=asked).settings
+    assert (again.pillar_points, again.ego_pillars) == (5, 9)
+    assert again.point_hidden == network.settings.point_hidden
 
 
 def test_the_same_weights_have_the_same_hash(network: Network, tmp_path: Path) -> None:

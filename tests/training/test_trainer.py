@@ -112,7 +112,9 @@ def test_fine_tuning_starts_from_the_weights_given(toy: ModuleType, tmp_path: Pa
     start = tmp_path / "first" / WEIGHTS_FILE
     optimiser = OptimiserSettings(rate=0.0)
     settings = replace(settings_of(toy, 1), start_from=start, optimiser=optimiser)
+    settings = replace(settings, network=replace(settings.network, pillar_points=3))
     train(settings, tmp_path / "second", source=toy.CarParks())
+    assert load_network(tmp_path / "second" / WEIGHTS_FILE).settings.pillar_points == 3
     before, _ = read_tensors(start)
     after, _ = read_tensors(tmp_path / "second" / WEIGHTS_FILE)
     for name, tensor in before.items():

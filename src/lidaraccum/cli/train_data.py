@@ -61,7 +61,9 @@ def sources_of(data: Sequence[str], settings: TrainSettings) -> Sources:
     if not data:
         return Sources()
     start = settings.start_from
-    network = settings.network if start is None else load_network(start).settings
+    network = settings.network
+    if start is not None:
+        network = load_network(start, network).settings
     learned, held = hold_out(labelled_folders(data))
     recorded = RecordedDrives(learned, open_labelled, network, settings.windows, settings.seed)
     if not held:

@@ -20,6 +20,8 @@ from lidaraccum.model.unet import channels_last
 FORMAT = "lidaraccum-network-1"
 _SETTINGS = "settings"
 _METADATA = "lidaraccum"
+_UNSAID = {"pillar_points": 0}
+"""How a network was made whose file does not say so: it is older than the setting."""
 
 
 def save_network(network: Network, path: Path, notes: Mapping[str, str] | None = None) -> None:
@@ -38,8 +40,12 @@ def save_network(network: Network, path: Path, notes: Mapping[str, str] | None =
     write_tensors(dict(network.state_dict()), metadata, path)
 
 
-def load_network(path: Path) -> Network:
+def load_network(path: Path, effort: NetworkSettings | None = None) -> Network:
     """The network a file holds, on the CPU, ready to answer.
+
+    Args:
+        path: The file.
+        effort: Whose `model.settings.EFFORT` to take instead of the file's own.
 
     Raises:
         MissingInputError: There is no such file.
@@ -48,7 +54,8 @@ def load_network(path: Path) -> Network:
     tensors, metadata = read_tensors(path)
     if metadata.get("format") != FORMAT:
         raise InputError(f"{path} holds no weights of this network")
-    network = Network(_settings(metadata[_SETTINGS], path))
+    settings = _settings(metadata[_SETTINGS], path)
+    network = Network(settings if effort is None else settings.with_effort(effort))
     try:
         network.load_state_dict(tensors)
     except RuntimeError as error:
@@ -63,7 +70,7 @@ def _settings(text: str, path: Path) -> NetworkSettings:
     if set(values) - known:
         unknown = ", ".join(sorted(set(values) - known))
         raise InputError(f"{path} was written by a newer version: {unknown} are unknown here")
-    return NetworkSettings(**values)
+    return NetworkSettings(**(_UNSAID | values))
 
 
 def write_tensors(

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from lidaraccum.errors import SettingsError
 
 COARSEST_CELLS = 16
 """Grid sides are multiples of this, so that every level of both U-Nets halves evenly."""
 
+EFFORT = ("extent_m", "pillar_points", "ego_pillars")
+"""Settings that say how much is looked at. Weights fit any, best those they learned with."""
+
 
 @dataclass(frozen=True)
 class NetworkSettings:
-    """What shapes the network; its weights fit only the same settings.
+    """What shapes the network; its weights fit only the same settings, but for `EFFORT`.
 
     Attributes:
         pillar_m: Side of a pillar, metres.
@@ -20,6 +23,7 @@ class NetworkSettings:
             another; the weights fit any.
         lowest_m: Points lower than this above the ground are left out.
         highest_m: Points higher than this above the ground are left out.
+        pillar_points: Points that tell of a pillar; of one that has more, so many; 0 for all.
         point_hidden: Channels between the two layers of the point-wise MLP.
         pillar_channels: Channels of a pillar before its projection.
         base_widths: Channels of the base U-Net by level, each half the size of the one before;
@@ -47,6 +51,7 @@ class NetworkSettings:
     extent_m: float = 64.0
     lowest_m: float = -2.0
     highest_m: float = 6.0
+    pillar_points: int = 16
     point_hidden: int = 32
     pillar_channels: int = 48
     base_widths: tuple[int, ...] = (32, 64, 128, 192)
@@ -76,6 +81,10 @@ class NetworkSettings:
         if self.lowest_m >= self.highest_m:
             raise SettingsError("lowest_m must be below highest_m")
         self.cells(self.extent_m)
+
+    def with_effort(self, other: NetworkSettings) -> NetworkSettings:
+        """These settings with another's `EFFORT`."""
+        return replace(self, **{name: getattr(other, name) for name in EFFORT})
 
     def cells(self, extent_m: float) -> int:
         """Cells along one side of a square grid of this extent, metres.

@@ -170,7 +170,7 @@ class _Run:
             return None
         network, windows = settings.network, settings.windows
         if settings.start_from is not None:
-            network = load_network(settings.start_from).settings
+            network = load_network(settings.start_from, network).settings
         make = SimulatedDrives(network, windows, DRIVES_SEED).make
         kind = "-".join(
             [f"{windows.extent_m:g}m", f"{windows.drive_frames}frames", *windows.sensors]

@@ -226,7 +226,7 @@ def _fresh_state(settings: TrainSettings, device: torch.device) -> RunState:
     if settings.start_from is None:
         network = build_network(settings.network, settings.seed)
     else:
-        network = load_network(settings.start_from)
+        network = load_network(settings.start_from, settings.network)
     network = network.to(device).train()
     average = copy.deepcopy(network).eval().requires_grad_(False)
     optimiser = torch.optim.Adam(network.parameters(), lr=settings.optimiser.rate)

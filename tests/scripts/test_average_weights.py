@@ -1,0 +1,49 @@
+"""The mean of weights is their mean, and of one network only."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+
+from lidaraccum.model.checkpoint import load_network, save_network
+from lidaraccum.model.network import build_network
+from lidaraccum.model.settings import NetworkSettings
+
+SCRIPT = Path(__file__).parents[2] / "scripts" / "average_weights.py"
+SMALL = NetworkSettings(extent_m=16.0, base_widths=(8, 8), motion_widths=(8, 8), ego_channels=8)
+
+
+def average(*names: Path, output: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, str(SCRIPT), *map(str, names), "-o", str(output)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> list[Path]:
+    paths = [tmp_path / f"{seed}.safetensors" for seed in range(3)]
+    for seed, path in enumerate(paths):
+        save_network(build_network(SMALL, seed), path)
+    return paths
+
+
+def test_every_weight_is_the_mean(files: list[Path], tmp_path: Path) -> None:
+    done = average(*files, output=tmp_path / "mean.safetensors")
+    assert done.returncode == 0, done.stderr
+    mean = load_network(tmp_path / "mean.safetensors")
+    parts = [dict(load_network(path).named_parameters()) for path in files]
+    for name, values in mean.named_parameters():
+        expected = (parts[0][name] + parts[1][name] + parts[2][name]) / 3
+        torch.testing.assert_close(values, expected)
+
+
+def test_other_networks_are_refused(files: list[Path], tmp_path: Path) -> None:
+    save_network(build_network(replace(SMALL, pillar_points=3)), files[0])
+    done = average(*files, output=tmp_path / "mean.safetensors")
+    assert done.returncode != 0
+    assert "settings" in done.stderr
+    assert not (tmp_path / "mean.safetensors").exists()
