@@ -93,6 +93,9 @@ class Lengths(click.ParamType):  # type: ignore[type-arg,unused-ignore]
 )
 @click.option("--frames", metavar="A:B:C", help="Only these frames, as a slice: start:stop:step.")
 @click.option("--by-gap", is_flag=True, help="Also EPE by frames between source and target.")
+@click.option(
+    "--by-part", is_flag=True, help="Also scores by range, kind, speed, ego speed and sensor."
+)
 @click.option("--per-scene", is_flag=True, help="Also averages over sequences, with deviation.")
 @click.option("--by-length", type=Lengths(), metavar="3..10", help="Also EPE by window length.")
 @click.option(
@@ -189,5 +192,5 @@ def _tell(report: EvaluationReport, params: dict[str, Any]) -> None:
     if params["as_json"]:
         click.echo(as_json(report), nl=False)
     else:
-        sections = Sections(scenes=params["per_scene"], gaps=params["by_gap"])
+        sections = Sections(params["per_scene"], params["by_gap"], params["by_part"])
         click.echo(markdown(report, sections), nl=False)

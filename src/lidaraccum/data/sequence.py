@@ -41,3 +41,12 @@ class LabelledSequence(Sequence, Protocol):
 
     def labels(self, index: int, /) -> Labels:
         """The truth about frame ``index``, row by row with its points."""
+
+
+@runtime_checkable
+class OfSensor(Protocol):
+    """A sequence that knows what took it."""
+
+    @property
+    def sensor(self) -> str:
+        """Its name; empty where nobody says."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.data.frame import Frame, Labels
-from lidaraccum.data.sequence import LabelledSequence
+from lidaraccum.data.sequence import LabelledSequence, OfSensor
 from lidaraccum.errors import SettingsError
 
 TARGETS = ("first", "middle", "last")
@@ -70,6 +70,11 @@ class Window:
     def crs_wkt(self) -> str | None:
         """The sequence's coordinate reference system, or None."""
         return self._sequence.crs_wkt
+
+    @property
+    def sensor(self) -> str:
+        """What took the sequence; empty where it does not say."""
+        return self._sequence.sensor if isinstance(self._sequence, OfSensor) else ""
 
     @property
     def true_poses(self) -> NDArray[np.float64]:

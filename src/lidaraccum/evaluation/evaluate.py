@@ -218,4 +218,4 @@ def _score(window: Window, truth: WindowTruth, method: Method, posed: _Posed) ->
     accumulator = Accumulator(window, settings, perceiver=perceiver, registered=posed.frames)
     placed = list(accumulator.frames())
     seconds = posed.seconds + time.process_time() - start
-    return score_window(placed, truth, window.target, seconds)
+    return score_window(placed, truth, window.target, seconds, window.sensor)

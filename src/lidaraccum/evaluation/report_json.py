@@ -65,6 +65,10 @@ def _method(one: MethodReport) -> dict[str, Any]:
             "frames": gaps,
             **{f"{part}_epe_cm": epe_by_gap(one, part, gaps) for part in PARTS},
         },
+        "by_part": {
+            kind: {name: asdict(part) for name, part in parts.items()}
+            for kind, parts in scores.by_part.items()
+        },
         "by_length": [
             {"frames": length, "windows": part.windows, **asdict(row_of("", part))}
             for length, part in one.by_length.items()

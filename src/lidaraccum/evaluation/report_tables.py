@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from lidaraccum.evaluation import paper
 from lidaraccum.evaluation.categories import CATEGORIES
 from lidaraccum.evaluation.evaluate import EvaluationReport, MethodReport
+from lidaraccum.evaluation.parts import PARTS as PARTS_OF_POINTS
 from lidaraccum.evaluation.table import Row, SceneRow, number, row_of, scene_row_of
 
 PARTS = ("static", "dynamic")
@@ -21,10 +22,12 @@ class Sections:
     Attributes:
         scenes: Averages over scenes.
         gaps: EPE by frames between source and target.
+        parts: Scores by range, kind, speed and sensor.
     """
 
     scenes: bool = True
     gaps: bool = True
+    parts: bool = True
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,8 @@ def tables_of(report: EvaluationReport, sections: Sections) -> list[Table]:
         tables.append(Table("By scene", SceneRow.titles(), scenes))
     if report.settings.lengths:
         tables.append(_by_length(report))
+    if sections.parts:
+        tables += [_by_part(report, kind) for kind in PARTS_OF_POINTS]
     return tables
 
 
@@ -94,6 +99,23 @@ def epe_by_gap(one: MethodReport, part: str, gaps: Sequence[int]) -> list[float]
     flows = [by_gap[gap] for gap in gaps]
     picked = [flow.static if part == "static" else flow.dynamic for flow in flows]
     return [100 * flow.epe_mean for flow in picked]
+
+
+def _by_part(report: EvaluationReport, kind: str) -> Table:
+    titles = ["", kind, "moving points", "motion P %", "R %", "movable R %"]
+    rows = [
+        [
+            one.method.name,
+            name,
+            f"{part.moving:,}",
+            *(number(100 * share, 1) for share in (part.precision, part.recall)),
+            number(100 * part.foreground_recall, 1),
+            *(number(100 * epe, 1) for epe in (part.dynamic_epe_m, part.static_epe_m)),
+        ]
+        for one in report.methods
+        for name, part in one.scores.by_part[kind].items()
+    ]
+    return Table(f"By {kind}", [*titles, "dynamic EPE cm", "static EPE cm"], rows)
 
 
 def _by_length(report: EvaluationReport) -> Table:

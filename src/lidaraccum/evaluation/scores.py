@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lidaraccum.data.accumulation import BACKGROUND, MOVING, AccumulatedFrame
 from lidaraccum.evaluation.categories import CATEGORIES
+from lidaraccum.evaluation.parts import Parts, added, score_parts
 from lidaraccum.evaluation.truth import FrameTruth, WindowTruth
 from lidaraccum.metrics import association, segmentation
 from lidaraccum.metrics.association import AssociationScore, keep_majority
@@ -40,6 +41,7 @@ class Scores:
         flow: Of source points, to where they belong in the target frame.
         by_gap: The same by frames between source and target.
         by_speed: The same by kind of object and true speed.
+        by_part: Counts by range, kind, speed and sensor.
         motion: Moving or not, points of all frames.
         foreground: Movable or not, points of all frames.
         association: Instances over all frames of a window, all objects.
@@ -56,6 +58,7 @@ class Scores:
     flow: FlowByPart = field(default_factory=_no_flow)
     by_gap: Mapping[int, FlowByPart] = field(default_factory=dict)
     by_speed: FlowBySpeed = field(default_factory=lambda: FlowBySpeed.pool((), CATEGORIES))
+    by_part: Parts = field(default_factory=dict)
     motion: SegmentationCounts = field(default_factory=SegmentationCounts)
     foreground: SegmentationCounts = field(default_factory=SegmentationCounts)
     association: AssociationScore = field(default_factory=lambda: AssociationScore.pool(()))
@@ -80,6 +83,7 @@ class Scores:
                 for gap in gaps
             },
             by_speed=self.by_speed + other.by_speed,
+            by_part=added((self.by_part, other.by_part)),
             motion=self.motion + other.motion,
             foreground=self.foreground + other.foreground,
             association=self.association + other.association,
@@ -97,7 +101,11 @@ class Scores:
 
 
 def score_window(
-    placed: Sequence[AccumulatedFrame], truth: WindowTruth, target: int, seconds: float
+    placed: Sequence[AccumulatedFrame],
+    truth: WindowTruth,
+    target: int,
+    seconds: float,
+    sensor: str = "",
 ) -> Scores:
     """Compare where the pipeline put the points of a window with where they belong.
 
@@ -106,6 +114,7 @@ def score_window(
         truth: Of the same frames.
         target: Index of the target frame.
         seconds: CPU time of the pipeline.
+        sensor: What took the window; empty where nobody says.
     """
     by_gap: dict[int, FlowByPart] = {}
     by_speed: list[FlowBySpeed] = []
@@ -130,6 +139,7 @@ def score_window(
         flow=FlowByPart.pool(by_gap.values()),
         by_gap=by_gap,
         by_speed=FlowBySpeed.pool(by_speed, CATEGORIES),
+        by_part=score_parts(placed, truth, target, sensor),
         motion=SegmentationCounts.pool(map(_motion, placed, truth.frames)),
         foreground=SegmentationCounts.pool(map(_foreground, placed, truth.frames)),
         association=whole,

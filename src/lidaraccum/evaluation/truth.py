@@ -49,6 +49,7 @@ class FrameTruth:
         foreground: (N,) bool.
         instance: (N,) int32, 0 for none.
         category: (N,) int, index in `categories.CATEGORIES`.
+        speed_mps: (N,) of the box that each is on, by the labels; 0 on none.
         way_m: (N,) metres it goes over ground from the frame's stamp to the target's, 0 where it
             stands or is not known.
     """
@@ -61,6 +62,7 @@ class FrameTruth:
     foreground: BoolArray
     instance: NDArray[np.int32]
     category: NDArray[np.int64]
+    speed_mps: NDArray[np.float64]
     way_m: NDArray[np.float64]
 
 
@@ -143,6 +145,7 @@ def _frame_truth(
         foreground=labels.foreground,
         instance=labels.instance,
         category=point_categories(labels),
+        speed_mps=_speeds(labels),
         way_m=np.linalg.norm(in_target - standing, axis=1),
     )
 
@@ -150,6 +153,13 @@ def _frame_truth(
 def _dynamic_instances(labels: Labels) -> set[int]:
     boxed = {box.id for box in labels.boxes if box.dynamic}
     return (boxed | set(np.unique(labels.instance[labels.dynamic]).tolist())) - {0}
+
+
+def _speeds(labels: Labels) -> NDArray[np.float64]:
+    speeds = np.zeros(len(labels.instance))
+    for box in labels.boxes:
+        speeds[labels.instance == box.id] = box.speed_mps
+    return speeds
 
 
 def _boxes(labels: Labels) -> dict[int, rigid.Pose]:

@@ -47,6 +47,7 @@ class Layout:
         label_kind: `NPZ_LABELS` or `SEMANTIC_KITTI_LABELS`, or empty.
         bin_fields: Names of the fields of ``.bin`` frames that the folder states, or none.
         boxes_file: Tracked boxes, or None.
+        sensor: What took the frames, as the folder states; empty where it does not.
         warnings: What looks odd, in words.
     """
 
@@ -63,6 +64,7 @@ class Layout:
     label_kind: str = ""
     bin_fields: tuple[str, ...] = ()
     boxes_file: Path | None = None
+    sensor: str = ""
     warnings: tuple[str, ...] = ()
 
 
@@ -172,6 +174,7 @@ def labelled_layout(folder: Path) -> Layout:
         label_kind=NPZ_LABELS if has_labels else "",
         bin_fields=stated_fields(folder / "meta.json", meta),
         boxes_file=first_file(folder, "boxes.json"),
+        sensor=str(meta.get("sensor", "")),
     )
 
 

@@ -95,6 +95,11 @@ class FileSequence:
         return self._poses_of(self._layout.poses_file)
 
     @property
+    def sensor(self) -> str:
+        """What took the frames, as the folder states; empty where it does not."""
+        return self._layout.sensor
+
+    @property
     def crs_wkt(self) -> str | None:
         """Coordinate reference system of the first frame as WKT, or None."""
         return self.las_reference.crs_wkt

@@ -63,6 +63,11 @@ class SimulatedSequence:
         return f"simulated-{self.drawn.scene}-{self.drawn.sensor.name}-{self.settings.seed}"
 
     @property
+    def sensor(self) -> str:
+        """The sensor's name."""
+        return self.drawn.sensor.name
+
+    @property
     def rate_hz(self) -> float:
         """Frames a second."""
         return self.drawn.rate_hz
