@@ -193,7 +193,8 @@ def without_outlasting(
 def without_strays(frame: SightedFrame, picked: NDArray[np.int64]) -> NDArray[np.int64]:
     """A mover's obstacles (K,) in a frame less the few that lie apart from all others."""
     part = connected_cells(frame.points[picked], STRAY_GAP_M)
-    return picked[np.bincount(part)[part] >= STRAY_SHARE * len(picked)]
+    counts = np.bincount(part)
+    return picked[counts[part] >= min(STRAY_SHARE * len(picked), counts.max())]
 
 
 def with_middle(
