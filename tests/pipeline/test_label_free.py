@@ -53,6 +53,12 @@ def test_a_mover_is_moved_as_it_moved(busy: list[PerceivedFrame], busy_street: A
     assert np.allclose((last @ rigid.invert(first))[:3, 3], [-4.8, 0, 0], atol=0.15)
 
 
+def test_the_edge_of_a_roof_over_a_nearer_car_does_not_go_along(look: Any) -> None:
+    """What shows of it past the nearer roof goes as the sensor does, and is seen past later."""
+    for frame in perceive(look(count=26, speed=3.0).frames):
+        assert (frame.label == BACKGROUND).all()
+
+
 def test_a_still_scene_with_noise_does_not_move(look: Any) -> None:
     for frame in perceive(look(noise=0.03).frames):
         assert (frame.label == BACKGROUND).all()

@@ -46,8 +46,8 @@ class PillarEncoder(nn.Module):
 def speakers(frames: FrameTensors, most: int) -> tuple[torch.Tensor, torch.Tensor]:
     """The points that tell of their pillars, and whose pillar each tells of, both (Q,) int64.
 
-    The maximum over hundreds of points is taller than that over ten of the same surface, and takes
-    as much longer: a near car, or one under a sensor of more rays, is another thing to the network.
+    The maximum over hundreds of points is taller than that over ten of the same surface: a near
+    car, or one under a sensor of more rays, would be another thing to the network.
 
     Source: PointPillars (Lang et al., CVPR 2019) takes so many at random; here they are every so
     many by height, the lowest and the highest among them.

@@ -56,6 +56,10 @@ AS_SENSOR_MPS = 0.5
 AS_SENSOR_SHARE = 0.25
 """Velocities nearer than this, and this share of its speed, are the sensor's own."""
 
+FEW_THROUGH = 0.4
+"""Few points that go so are a mover if so large a share was seen through: the edge of a roof that
+shows over a nearer one goes along, and is seen past."""
+
 
 @dataclass(frozen=True, eq=False)
 class Expectation:
@@ -253,14 +257,23 @@ def _is_motion(
         and verdict.cost[best] < settings.max_cost * (1.0 if _are_many(suspect) else FEW_COST)
         and verdict.cost[best] < settings.max_share * verdict.cost[0]
         and verdict.shown[best] > settings.min_shown
-        and (
-            verdict.through[0] > settings.min_through
-            or (
-                verdict.shown[best] > settings.shown
-                and not _goes_as_sensor(suspect, rivals[best], frames)
-            )
-        )
+        and _is_accused(suspect, rivals[best], verdict, best, frames, settings)
     )
+
+
+def _is_accused(
+    suspect: Suspect,
+    velocity: NDArray[np.float64],
+    verdict: Verdict,
+    best: int,
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+) -> bool:
+    """Whether enough of a suspect was seen through or, where it creeps, shown to move."""
+    seen, needed = float(verdict.through[0]), settings.min_through
+    if needed >= 0 and _goes_as_sensor(suspect, velocity, frames):
+        return seen > (needed if _are_many(suspect) else max(needed, FEW_THROUGH))
+    return seen > needed or float(verdict.shown[best]) > settings.shown
 
 
 def _goes_as_sensor(
