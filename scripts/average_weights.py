@@ -14,6 +14,7 @@ from pathlib import Path
 import torch
 
 from lidaraccum.model.checkpoint import load_network, save_network
+from lidaraccum.model.weights import weights_hash
 
 
 def main() -> None:
@@ -31,7 +32,8 @@ def main() -> None:
     with torch.no_grad():
         for name, values in mean.named_parameters():
             values.copy_(torch.stack([other[name] for other in others]).mean(dim=0))
-    save_network(mean, options.output, {"mean_of": ", ".join(map(str, options.weights))})
+    parts = ", ".join(weights_hash(path)[:12] for path in options.weights)
+    save_network(mean, options.output, {"mean_of": parts})
 
 
 if __name__ == "__main__":
