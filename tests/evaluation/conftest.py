@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from lidaraccum.data.accumulation import MOVING, AccumulatedFrame
 from lidaraccum.data.frame import Box, Frame, Labels
+from lidaraccum.evaluation.truth import WindowTruth
 from lidaraccum.geometry import rigid
 
 CAR, WALKER = 7, 9
@@ -63,6 +66,37 @@ class HandMade:
 @pytest.fixture
 def hand_made() -> HandMade:
     return HandMade()
+
+
+def put_right(truth: WindowTruth, shift: float = 0.0) -> list[AccumulatedFrame]:
+    """The true answer, all but the target's points off by a shift along z."""
+    frames = []
+    for index, frame in enumerate(truth.frames):
+        count = len(frame.known)
+        points = frame.in_target + np.array([0.0, 0.0, shift if index else 0.0])
+        frames.append(
+            AccumulatedFrame(
+                index=index,
+                points=points,
+                rows=np.arange(count),
+                row_count=count,
+                label=np.where(frame.dynamic, MOVING, 0).astype(np.uint8),
+                instance=frame.instance,
+                confidence=np.ones(count, dtype=np.float32),
+                time=np.zeros(count),
+                range_m=np.ones(count, dtype=np.float32),
+                stamp=0.1 * index,
+                reference_from_sensor=truth.poses[index],
+                attributes={},
+            )
+        )
+    return frames
+
+
+@pytest.fixture
+def placed() -> Callable[..., list[AccumulatedFrame]]:
+    """`placed(truth, shift=0)`: frames as `put_right` makes them."""
+    return put_right
 
 
 @pytest.fixture(scope="session")

@@ -4,44 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 
-from lidaraccum.data.accumulation import MOVING, AccumulatedFrame
 from lidaraccum.data.window import Window
 from lidaraccum.evaluation.categories import CAR
 from lidaraccum.evaluation.scores import Scores, score_window
-from lidaraccum.evaluation.truth import Scope, WindowTruth, window_truth
+from lidaraccum.evaluation.truth import Scope, window_truth
 
 EVERYWHERE = Scope(half_width_m=0)
 
 
-def placed(truth: WindowTruth, shift: float = 0.0) -> list[AccumulatedFrame]:
-    """The true answer, all but the target's points off by a shift along z."""
-    frames = []
-    for index, frame in enumerate(truth.frames):
-        count = len(frame.known)
-        points = frame.in_target + np.array([0.0, 0.0, shift if index else 0.0])
-        frames.append(
-            AccumulatedFrame(
-                index=index,
-                points=points,
-                rows=np.arange(count),
-                row_count=count,
-                label=np.where(frame.dynamic, MOVING, 0).astype(np.uint8),
-                instance=frame.instance,
-                confidence=np.ones(count, dtype=np.float32),
-                time=np.zeros(count),
-                range_m=np.ones(count, dtype=np.float32),
-                stamp=0.1 * index,
-                reference_from_sensor=truth.poses[index],
-                attributes={},
-            )
-        )
-    return frames
-
-
-def test_the_truth_itself_scores_perfectly(hand_made: Any) -> None:
+def test_the_truth_itself_scores_perfectly(placed: Any, hand_made: Any) -> None:
     truth = window_truth(Window(hand_made, 0, 3), EVERYWHERE)
     scores = score_window(placed(truth), truth, 0, 1.5)
     assert scores.flow.everything.epe_mean == 0.0
@@ -54,7 +27,9 @@ def test_the_truth_itself_scores_perfectly(hand_made: Any) -> None:
     assert scores.seconds_per_window == 1.5
 
 
-def test_a_shift_is_the_epe_of_every_source_frame_and_of_none_but_those(hand_made: Any) -> None:
+def test_a_shift_is_the_epe_of_every_source_frame_and_of_none_but_those(
+    placed: Any, hand_made: Any
+) -> None:
     truth = window_truth(Window(hand_made, 0, 3), EVERYWHERE)
     scores = score_window(placed(truth, 0.2), truth, 0, 0.0)
     assert scores.flow.everything.epe_mean == pytest.approx(0.2)
@@ -64,14 +39,14 @@ def test_a_shift_is_the_epe_of_every_source_frame_and_of_none_but_those(hand_mad
     assert sum(flow.everything.points for flow in scores.by_gap.values()) == 10
 
 
-def test_gaps_count_both_ways_from_a_target_in_the_middle(hand_made: Any) -> None:
+def test_gaps_count_both_ways_from_a_target_in_the_middle(placed: Any, hand_made: Any) -> None:
     window = Window(hand_made, 0, 3, "middle")
     truth = window_truth(window, EVERYWHERE)
     scores = score_window(placed(truth), truth, window.target, 0.0)
     assert list(scores.by_gap) == [1]
 
 
-def test_two_added_are_both(hand_made: Any) -> None:
+def test_two_added_are_both(placed: Any, hand_made: Any) -> None:
     truth = window_truth(Window(hand_made, 0, 3), EVERYWHERE)
     one = score_window(placed(truth, 0.1), truth, 0, 1.0)
     other = score_window(placed(truth, 0.3), truth, 0, 3.0)

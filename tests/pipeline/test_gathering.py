@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from lidaraccum.pipeline.gathering import seconds_at_place, without_strays
+from lidaraccum.pipeline.gathering import length_along, seconds_at_place, without_strays
 
 
 @dataclass(frozen=True)
@@ -35,5 +35,5 @@ def test_points_that_are_all_apart_stay(count: int) -> None:
 def test_a_long_thing_is_longer_at_its_place_than_a_wide_one() -> None:
     bus = np.array([[0.0, 0.0, 0.0], [12.0, 2.5, 3.0]])
     ahead, aside = np.array([6.0, 0.0, 0.0]), np.array([0.0, 6.0, 0.0])
-    assert seconds_at_place(bus, ahead) == pytest.approx(12.3 / 6)
-    assert seconds_at_place(bus, aside) == pytest.approx(2.8 / 6)
+    assert seconds_at_place(length_along(bus, ahead), ahead) == pytest.approx(12.3 / 6)
+    assert seconds_at_place(length_along(bus, aside), aside) == pytest.approx(2.8 / 6)

@@ -192,5 +192,7 @@ def _tell(report: EvaluationReport, params: dict[str, Any]) -> None:
     if params["as_json"]:
         click.echo(as_json(report), nl=False)
     else:
-        sections = Sections(params["per_scene"], params["by_gap"], params["by_part"])
+        sections = Sections(
+            scenes=params["per_scene"], gaps=params["by_gap"], parts=params["by_part"]
+        )
         click.echo(markdown(report, sections), nl=False)

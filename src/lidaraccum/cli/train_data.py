@@ -54,16 +54,13 @@ def labelled_folders(data: Sequence[str]) -> list[str]:
 
 def sources_of(data: Sequence[str], settings: TrainSettings) -> Sources:
     """Windows of labelled sequences, a share of them held out; simulated ones without any."""
-    from lidaraccum.model.checkpoint import load_network
     from lidaraccum.training.dataset import RecordedDrives
     from lidaraccum.training.held_out import HeldOutSequences, hold_out
+    from lidaraccum.training.trainer import fresh_network
 
     if not data:
         return Sources()
-    start = settings.start_from
-    network = settings.network
-    if start is not None:
-        network = load_network(start, network).settings
+    network = fresh_network(settings).settings
     learned, held = hold_out(labelled_folders(data))
     recorded = RecordedDrives(learned, open_labelled, network, settings.windows, settings.seed)
     if not held:

@@ -29,7 +29,7 @@ def _names(edges: tuple[float, ...], unit: str) -> tuple[str, ...]:
 
 
 SENSOR = "sensor"
-PARTS: Mapping[str, tuple[str, ...]] = {
+PARTINGS: Mapping[str, tuple[str, ...]] = {
     "range": _names(RANGE_EDGES_M, "m"),
     "kind": CATEGORIES,
     "object speed": _names(SPEED_EDGES_MPS, "m/s"),
@@ -96,18 +96,18 @@ class PartScore:
 
 
 Parts = Mapping[str, Mapping[str, PartScore]]
-"""By kind and part, in the order of `PARTS`."""
+"""By kind and part, in the order of `PARTINGS`."""
 
 
 def added(parts: Iterable[Parts]) -> Parts:
     """All of several, part by part."""
-    total: dict[str, dict[str, PartScore]] = {kind: {} for kind in PARTS}
+    total: dict[str, dict[str, PartScore]] = {kind: {} for kind in PARTINGS}
     for one in parts:
         for kind, scores in one.items():
             for name, score in scores.items():
                 total[kind][name] = total[kind].get(name, PartScore()) + score
     return {
-        kind: {name: scores[name] for name in (PARTS[kind] or sorted(scores)) if name in scores}
+        kind: {name: scores[name] for name in (PARTINGS[kind] or sorted(scores)) if name in scores}
         for kind, scores in total.items()
     }
 
@@ -136,7 +136,7 @@ def score_parts(
         }
         frames.append(
             {
-                kind: _parted(columns, part, PARTS[kind] or (sensor or "not told",))
+                kind: _parted(columns, part, PARTINGS[kind] or (sensor or "not told",))
                 for kind, part in part_of.items()
             }
         )

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from lidaraccum.evaluation import paper
 from lidaraccum.evaluation.categories import CATEGORIES
 from lidaraccum.evaluation.evaluate import EvaluationReport, MethodReport
-from lidaraccum.evaluation.parts import PARTS as PARTS_OF_POINTS
+from lidaraccum.evaluation.parts import PARTINGS
 from lidaraccum.evaluation.table import Row, SceneRow, number, row_of, scene_row_of
 
 PARTS = ("static", "dynamic")
@@ -60,7 +60,7 @@ def tables_of(report: EvaluationReport, sections: Sections) -> list[Table]:
     if report.settings.lengths:
         tables.append(_by_length(report))
     if sections.parts:
-        tables += [_by_part(report, kind) for kind in PARTS_OF_POINTS]
+        tables += [_by_part(report, kind) for kind in PARTINGS]
     return tables
 
 

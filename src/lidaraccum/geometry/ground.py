@@ -109,12 +109,12 @@ def _are_ground(
     nothing of the road, but much that is as deep.
     """
     counts, on_road = _counts(deep), _counts(flat)
-    thin = THIN_SHARE * _usual(on_road)
-    has_company = _look_up((counts >= ROAD_POINTS) & (counts >= thin), deep)
+    counts[counts < THIN_SHARE * _usual(on_road)] = 0
+    has_company = _look_up(counts >= ROAD_POINTS, deep)
     if mount_m < LEAST_MOUNT_M:
         return has_company
     road = on_road >= ROAD_POINTS
-    ditch = (counts >= DITCH_POINTS) & (counts >= thin) & ~road
+    ditch = (counts >= DITCH_POINTS) & ~road
     crossing = mount_m / (mount_m - deep[:, 2])
     at_crossing = _look_up(road, deep[:, :2] * crossing[:, None])
     half_way = _look_up(ditch, deep[:, :2] * (0.5 + 0.5 * crossing)[:, None])

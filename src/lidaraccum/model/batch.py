@@ -87,14 +87,14 @@ def prepare(
 
 
 def _by_pillar(cell: NDArray[np.int32], height: NDArray[Any]) -> NDArray[np.int64]:
-    """Order (N,) of points by pillar and, within it, by height: as one number, twice as fast."""
+    """Order (N,) of points by pillar and, within it, by height: one number sorts faster."""
     above = height.astype(np.float64) - height.min()
     return np.argsort(cell * (above.max() + 1.0) + above)
 
 
 @dataclass(frozen=True, eq=False)
 class FrameTensors:
-    """F frames on one device: P points in V occupied pillars, sorted by frame, then by pillar.
+    """F frames on one device: P points in V occupied pillars, sorted by frame, pillar, height.
 
     Attributes:
         points: (P, 3) float32, metres, level coordinates of the point's own frame.

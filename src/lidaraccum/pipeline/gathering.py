@@ -175,11 +175,14 @@ def without_standing(
     return kept
 
 
-def seconds_at_place(points: NDArray[np.float64], velocity: NDArray[np.float64]) -> float:
-    """How long a mover of such points (N, 3), world, and velocity (3,) is at a place."""
-    speed = float(np.linalg.norm(velocity))
-    length = float(np.ptp(points[:, :2] @ velocity[:2])) / speed
-    return (length + PASSING_M) / speed
+def length_along(points: NDArray[np.float64], velocity: NDArray[np.float64]) -> float:
+    """Metres from end to end of points (N, 3), world, the way a velocity (3,) goes."""
+    return float(np.ptp(points[:, :2] @ velocity[:2]) / np.linalg.norm(velocity))
+
+
+def seconds_at_place(length_m: float, velocity: NDArray[np.float64]) -> float:
+    """How long a mover of such a length and velocity (3,) is at a place."""
+    return (length_m + PASSING_M) / float(np.linalg.norm(velocity))
 
 
 def without_outlasting(

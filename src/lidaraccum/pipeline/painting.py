@@ -13,7 +13,7 @@ from lidaraccum.pipeline.association import Track
 from lidaraccum.pipeline.courses import course, turned
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.gathering import (
-    PASSING_M,
+    length_along,
     seconds_at_place,
     without_outlasting,
     without_strays,
@@ -114,7 +114,7 @@ def paint_mover(track: Track, frame: SightedFrame, canvas: Canvas, box_growth: f
     """Give a mover its points of a frame, from windows or, for a while, from its shape alone."""
     picked = canvas.free(track.picked.get(frame.index, _NONE))
     if len(picked):
-        seconds = _seconds_at_place(track, frame, picked)
+        seconds = seconds_at_place(_length(track, frame, picked), track.velocities[frame.index])
         picked = without_strays(frame, without_outlasting(frame, picked, seconds))
         _follow(track, frame, picked)
         inside = canvas.free(_in_box(track, frame, box_growth))
@@ -181,12 +181,11 @@ def _note(track: Track, frame: SightedFrame, pose: rigid.Pose, points: int) -> N
     track.most_points = max(track.most_points, points)
 
 
-def _seconds_at_place(track: Track, frame: SightedFrame, picked: NDArray[np.int64]) -> float:
-    """How long a mover is at a place: what it has shown or, at first, its obstacles (K,) tell."""
-    velocity = track.velocities[frame.index]
+def _length(track: Track, frame: SightedFrame, picked: NDArray[np.int64]) -> float:
+    """How long a mover is: what it has shown or, at first, its obstacles (K,) tell. Metres."""
     if track.shape is None:
-        return seconds_at_place(frame.world(picked), velocity)
-    return (track.shape.length_m + PASSING_M) / float(np.linalg.norm(velocity))
+        return length_along(frame.world(picked), track.velocities[frame.index])
+    return track.shape.length_m
 
 
 def _in_box(track: Track, frame: SightedFrame, growth: float) -> NDArray[np.int64]:

@@ -15,7 +15,7 @@ from lidaraccum.geometry.clustering import dense_groups
 from lidaraccum.model.reading import ObjectReading, WindowReading
 from lidaraccum.pipeline.courses import turned
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.gathering import seconds_at_place, without_outlasting
+from lidaraccum.pipeline.gathering import length_along, seconds_at_place, without_outlasting
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.suspects import Lead, Suspect
 
@@ -185,7 +185,8 @@ def _passing(group: _Group, frames: Sequence[SightedFrame]) -> _Group:
     if not np.linalg.norm(velocity) > SLOWEST_MPS:
         return group
     place = max(group, key=lambda place: len(group[place]))
-    seconds = seconds_at_place(frames[place].world(group[place]), velocity)
+    length = length_along(frames[place].world(group[place]), velocity)
+    seconds = seconds_at_place(length, velocity)
     return {
         place: without_outlasting(frames[place], picked, seconds) for place, picked in group.items()
     }

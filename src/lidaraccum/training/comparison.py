@@ -26,7 +26,7 @@ from lidaraccum.training.loader import store_all
 from lidaraccum.training.recipes import PlanSettings, Recipe, check_plan
 from lidaraccum.training.scores import Scores
 from lidaraccum.training.state import METRICS_FILE
-from lidaraccum.training.trainer import TrainReport, train
+from lidaraccum.training.trainer import TrainReport, fresh_network, train
 from lidaraccum.training.watch import Watch
 
 SETTINGS_FILE = "settings.json"
@@ -168,9 +168,7 @@ class _Run:
         settings, shared = self.settings, self.plan.drives
         if not settings.keep_drives or shared is None:
             return None
-        network, windows = settings.network, settings.windows
-        if settings.start_from is not None:
-            network = load_network(settings.start_from, network).settings
+        network, windows = fresh_network(settings).settings, settings.windows
         make = SimulatedDrives(network, windows, DRIVES_SEED).make
         kind = "-".join(
             [f"{windows.extent_m:g}m", f"{windows.drive_frames}frames", *windows.sensors]

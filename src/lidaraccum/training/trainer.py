@@ -14,7 +14,7 @@ import torch
 
 from lidaraccum.errors import OutputExistsError, SettingsError
 from lidaraccum.model.checkpoint import load_network
-from lidaraccum.model.network import build_network
+from lidaraccum.model.network import Network, build_network
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.training.crew import Crew
 from lidaraccum.training.dataset import SimulatedDrives, ValidationDrives, WindowSource
@@ -222,12 +222,15 @@ def _pick_device(name: str) -> torch.device:
     return torch.device(name)
 
 
-def _fresh_state(settings: TrainSettings, device: torch.device) -> RunState:
+def fresh_network(settings: TrainSettings) -> Network:
+    """What a run begins with: weights drawn by its seed, or those it goes on from."""
     if settings.start_from is None:
-        network = build_network(settings.network, settings.seed)
-    else:
-        network = load_network(settings.start_from, settings.network)
-    network = network.to(device).train()
+        return build_network(settings.network, settings.seed)
+    return load_network(settings.start_from, settings.network)
+
+
+def _fresh_state(settings: TrainSettings, device: torch.device) -> RunState:
+    network = fresh_network(settings).to(device).train()
     average = copy.deepcopy(network).eval().requires_grad_(False)
     optimiser = torch.optim.Adam(network.parameters(), lr=settings.optimiser.rate)
     return RunState(network, average, optimiser)
