@@ -12,7 +12,8 @@ from lidaraccum.data.accumulation import MOVING, Accumulation
 from lidaraccum.data.frame import Box, Frame, Labels
 from lidaraccum.errors import InputError, SettingsError
 from lidaraccum.geometry import rigid
-from lidaraccum.pipeline.accumulator import AccumulateSettings, accumulate
+from lidaraccum.pipeline.accumulator import AccumulateSettings, Accumulator, accumulate
+from lidaraccum.pipeline.label_free import LabelFree
 from lidaraccum.pipeline.selection import SelectionSettings
 
 MOVER, RATE_HZ = 7, 10.0
@@ -113,6 +114,22 @@ def test_every_point_comes_out_once_in_order(sequence: DriveWithMover) -> None:
     counts = [len(sequence[index]) for index in range(6)]
     np.testing.assert_array_equal(result.frame, np.repeat(range(6), counts))
     assert set(np.unique(result.label)) == {0}
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_a_process_more_changes_nothing(sequence: DriveWithMover, named: bool) -> None:
+    """Whether it makes frames ready for free space, or a perceiver came along that does."""
+    settings = AccumulateSettings(method="label-free", preset="aggressive")
+    perceiver = None if named else LabelFree()
+    one, two = (
+        list(Accumulator(sequence, settings, perceiver=perceiver, processes=count).frames())
+        for count in (1, 2)
+    )
+    assert any((frame.label == MOVING).any() for frame in one)
+    for here, there in zip(one, two, strict=True):
+        np.testing.assert_array_equal(here.points, there.points)
+        np.testing.assert_array_equal(here.label, there.label)
+        np.testing.assert_array_equal(here.confidence, there.confidence)
 
 
 def test_one_frame_is_too_few(sequence: DriveWithMover) -> None:

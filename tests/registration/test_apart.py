@@ -13,15 +13,15 @@ import pytest
 
 from lidaraccum.data.frame import Frame
 from lidaraccum.errors import InputError, ProcessLostError
-from lidaraccum.registration.apart import Registrar
+from lidaraccum.registration.apart import Plain, Registrar
 from lidaraccum.registration.odometry import register
 from lidaraccum.registration.settings import RegistrationSettings
 
 
 @pytest.fixture
-def registrar() -> Iterator[Registrar]:
+def registrar() -> Iterator[Registrar[Plain]]:
     """A process for the defaults, ended whatever happens."""
-    made = Registrar()
+    made = Registrar(Plain)
     yield made
     made.close()
     assert not multiprocessing.active_children()
@@ -37,10 +37,10 @@ def with_more(frame: Frame) -> Frame:
 
 @pytest.mark.parametrize(("kind", "count"), [("straight", 12), ("rolling", 6), ("straight", 3)])
 def test_frames_come_back_as_if_registered_here(
-    request: pytest.FixtureRequest, registrar: Registrar, kind: str, count: int
+    request: pytest.FixtureRequest, registrar: Registrar[Plain], kind: str, count: int
 ) -> None:
     frames = [with_more(frame) for frame in request.getfixturevalue(kind).frames[:count]]
-    there = list(registrar.register(iter(frames)))
+    there = [one.registered for one in registrar.register(iter(frames))]
     here = list(register(iter(frames)))
     assert len(there) == len(here) == count
     for one, other in zip(there, here, strict=True):
@@ -56,11 +56,11 @@ def test_frames_come_back_as_if_registered_here(
 def test_given_poses_are_used_and_their_number_counts_there_too(straight: Any) -> None:
     given = straight.poses
     settings = RegistrationSettings()
-    short = Registrar(settings, given[:-1])
-    whole = Registrar(settings, given)
+    short = Registrar(Plain, settings, given[:-1])
+    whole = Registrar(Plain, settings, given)
     try:
         frames = list(whole.register(straight.frames))
-        assert frames[-1].world_from_sensor == pytest.approx(given[-1])
+        assert frames[-1].registered.world_from_sensor == pytest.approx(given[-1])
         with pytest.raises((InputError, IndexError)) as caught:
             list(short.register(straight.frames))
         assert "in _serve" in str(caught.value.__cause__)
@@ -69,7 +69,7 @@ def test_given_poses_are_used_and_their_number_counts_there_too(straight: Any) -
         whole.close()
 
 
-def test_a_process_that_is_killed_is_told(registrar: Registrar, straight: Any) -> None:
+def test_a_process_that_is_killed_is_told(registrar: Registrar[Plain], straight: Any) -> None:
     frames = registrar.register(straight.frames)
     next(frames)
     (process,) = multiprocessing.active_children()

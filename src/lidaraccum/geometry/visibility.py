@@ -81,10 +81,25 @@ class RangeView:
         self._columns = band.shape[1]
         unknown = np.full((self._rows, self._columns), np.nan, dtype=np.float32)
         self._nearest, self._nearest_solid = unknown.ravel(), unknown.copy().ravel()
+        self._band = slice(first * self._columns, first * self._columns + band.size)
         if len(band):
-            place = slice(first * self._columns, first * self._columns + band.size)
-            self._nearest[place] = _nearest_about(band)
-            self._nearest_solid[place] = _nearest_about(_without_specks(band))
+            self._nearest[self._band] = _nearest_about(band)
+            self._nearest_solid[self._band] = _nearest_about(_without_specks(band))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what is beyond the band: mostly nothing, and most of it."""
+        state = self.__dict__.copy()
+        for name in ("_nearest", "_nearest_solid"):
+            state[name] = state[name][self._band]
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """As it was."""
+        self.__dict__.update(state)
+        for name in ("_nearest", "_nearest_solid"):
+            whole = np.full(self._rows * self._columns, np.nan, dtype=np.float32)
+            whole[self._band] = state[name]
+            setattr(self, name, whole)
 
     def look(self, points: NDArray[Any], own_from_points: rigid.Pose | None = None) -> Sighting:
         """What the frame saw of places (N, 3), metres.

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -27,10 +28,11 @@ from lidaraccum.pipeline.perception import AllStatic, GivenLabels, Perceiver
 from lidaraccum.pipeline.placing import Reference
 from lidaraccum.pipeline.report import FrameTally
 from lidaraccum.pipeline.selection import Selection, SelectionSettings
+from lidaraccum.pipeline.sighting import Sighter
 from lidaraccum.pipeline.spool import after_the_last
 from lidaraccum.pipeline.tracks import TrackBook
 from lidaraccum.pipeline.tubes import Reader
-from lidaraccum.registration.apart import Registrar
+from lidaraccum.registration.apart import Plain, Registrar
 from lidaraccum.registration.odometry import register
 from lidaraccum.registration.settings import RegistrationSettings
 
@@ -39,6 +41,10 @@ log = logging.getLogger(__name__)
 METHODS = ("network", "label-free", "ego-only", "oracle")
 """What finds the movers: the network verified by geometry, geometry alone, nothing, or the labels
 that came with the sequence."""
+
+
+SIGHTING_METHODS = ("network", "label-free")
+"""Those that look for free space."""
 
 
 def default_method(weights: Path | None = None) -> str:
@@ -118,18 +124,21 @@ class Accumulator:
             perceiver: What finds the movers, where it is not the one that the settings name.
             registered: The sequence's frames, registered before; otherwise they are read and
                 registered here.
-            processes: With 2, frames are registered in a process of its own while movers are
-                looked for in those before them; the program's own module must then be one that
-                can be imported twice (`multiprocessing`'s way to start a process).
+            processes: With 2, frames are registered, and what free space takes is made ready, in a
+                process of its own while movers are looked for in those before them; the program's
+                own module must then be one that can be imported twice (`multiprocessing`'s way to
+                start a process).
         """
         if len(sequence) < 2:
             raise InputError(f"{sequence.name} has {len(sequence)} frame; it takes at least 2")
         self._sequence = sequence
         self._settings = settings
         self._reference_index = reference_index(settings.reference, sequence)
-        self._registrar: Registrar | None = None
+        self._sights = perceiver is None and settings.method in SIGHTING_METHODS
+        self._registrar: Registrar[Any] | None = None
         if processes > 1 and registered is None:
-            self._registrar = Registrar(settings.registration, sequence.poses)
+            make = Sighter(PRESETS[settings.preset]) if self._sights else Plain
+            self._registrar = Registrar(make, settings.registration, sequence.poses)
         self._perceiver = perceiver or choose_perceiver(settings, sequence)
         self.weights = self._perceiver.weights if isinstance(self._perceiver, NetworkLed) else None
         self._registered = registered
@@ -149,10 +158,7 @@ class Accumulator:
                 self._registrar.close()
 
     def _frames(self) -> Iterator[AccumulatedFrame]:
-        registered = self._registered
-        if registered is None:
-            registered = self.clock.timed("register", self._register())
-        perceived = self.clock.timed("perceive", self._perceiver.perceive(registered))
+        perceived = self.clock.timed("perceive", self._perceive())
         noted = self._note(self.clock.timed("undo own motion", self._undo(perceived)))
         if self._reference_index > 0:
             noted = self.clock.timed("wait for the reference", after_the_last(noted))
@@ -169,10 +175,20 @@ class Accumulator:
         """What was found to be an object, once all frames are through."""
         return self._book.tracks(self._found_reference().reference_from_world)
 
+    def _perceive(self) -> Iterator[PerceivedFrame]:
+        if self._registrar is None:
+            registered = self._registered
+            if registered is None:
+                registered = self.clock.timed("register", self._register())
+            return self._perceiver.perceive(registered)
+        # Reading is no stage that anybody waits for.
+        made = ahead(self._registrar.register(ahead(self._read())))
+        ready = self.clock.timed("register", made)
+        if self._sights and isinstance(self._perceiver, (LabelFree, NetworkLed)):
+            return self._perceiver.perceive_sighted(ready)
+        return self._perceiver.perceive(one.registered for one in ready)
+
     def _register(self) -> Iterator[RegisteredFrame]:
-        """Frames registered; in a process of its own reading them is no stage that we wait for."""
-        if self._registrar is not None:
-            return ahead(self._registrar.register(ahead(self._read())))
         frames = self.clock.timed("read", ahead(self._read()))
         return register(frames, self._settings.registration, self._sequence.poses)
 

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Protocol
 
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.painting import Canvas
 from lidaraccum.pipeline.suspects import Lead
 
+Leads = Callable[[], Sequence[Lead]]
+"""Tells what may move, the likeliest first; asked late, for it may still be being thought about."""
+
+
+def no_leads() -> Sequence[Lead]:
+    """Nothing."""
+    return ()
+
 
 class Advice(Protocol):
     """Proposes movers window by window, and names what is movable but stands."""
 
-    def see(self, frame: SightedFrame) -> None:
-        """Take in the next frame."""
+    def seen(self, frames: Iterable[SightedFrame]) -> Iterator[SightedFrame]:
+        """Take the frames in and hand them on, in order; a few are taken in before."""
 
-    def leads(self, window: Sequence[SightedFrame]) -> list[Lead]:
-        """What may move in a window of frames that were seen, the likeliest first."""
+    def leads(self, window: Sequence[SightedFrame]) -> Leads:
+        """Begin to look at a window of frames that were seen; to be asked before the next."""
 
     def name_still(self, frame: SightedFrame, canvas: Canvas) -> None:
         """Paint what is movable but stands, once the frame's movers are painted; in order."""
@@ -26,12 +34,13 @@ class Advice(Protocol):
 class NoAdvice:
     """Nobody proposes anything: free space alone raises suspicion, nobody knows what stands."""
 
-    def see(self, frame: SightedFrame) -> None:
-        """Nothing."""
+    def seen(self, frames: Iterable[SightedFrame]) -> Iterator[SightedFrame]:
+        """The frames."""
+        return iter(frames)
 
-    def leads(self, window: Sequence[SightedFrame]) -> list[Lead]:
+    def leads(self, window: Sequence[SightedFrame]) -> Leads:
         """None."""
-        return []
+        return no_leads
 
     def name_still(self, frame: SightedFrame, canvas: Canvas) -> None:
         """Nothing."""

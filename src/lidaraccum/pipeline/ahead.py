@@ -10,11 +10,12 @@ from typing import TypeVar
 
 Item = TypeVar("Item")
 
-FRAMES_AHEAD = 2
+FRAMES_AHEAD = 4
+"""Movers are looked for every four frames: meanwhile the next four can be made ready."""
 
 
 def ahead(items: Iterable[Item]) -> Iterator[Item]:
-    """Each item in order, made in a thread of its own up to two items ahead.
+    """Each item in order, made in a thread of its own up to `FRAMES_AHEAD` items ahead.
 
     What making an item raises is raised when it is that item's turn.
     """

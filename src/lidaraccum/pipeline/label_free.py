@@ -7,8 +7,10 @@ from collections.abc import Iterable, Iterator
 from lidaraccum.data.perceived import PerceivedFrame
 from lidaraccum.data.registered import RegisteredFrame
 from lidaraccum.pipeline.advice import NoAdvice
+from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import BALANCED, MotionSettings
 from lidaraccum.pipeline.mover_stream import MoverStream
+from lidaraccum.pipeline.sighting import Sighter
 
 
 class LabelFree:
@@ -23,4 +25,8 @@ class LabelFree:
 
     def perceive(self, frames: Iterable[RegisteredFrame]) -> Iterator[PerceivedFrame]:
         """Each frame once, in order, its movers labelled and placed."""
+        return self.perceive_sighted(Sighter(self._settings).all(frames))
+
+    def perceive_sighted(self, frames: Iterable[SightedFrame]) -> Iterator[PerceivedFrame]:
+        """As `perceive`, of frames that a `Sighter` of the same settings has sighted."""
         return MoverStream(self._settings, NoAdvice()).run(frames)

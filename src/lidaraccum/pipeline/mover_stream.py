@@ -6,12 +6,7 @@ import logging
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lidaraccum.data.perceived import PerceivedFrame
-from lidaraccum.data.registered import RegisteredFrame
-from lidaraccum.geometry.viewpoint import find_viewpoint
 from lidaraccum.pipeline.advice import Advice
 from lidaraccum.pipeline.association import Association
 from lidaraccum.pipeline.courses import are_alike
@@ -48,26 +43,21 @@ class MoverStream:
         self._association = Association(settings, ids or ObjectIds())
         self._waiting: deque[SightedFrame] = deque()
         self._since_window = 0
-        self._viewpoint: NDArray[np.float64] | None = None
 
-    def run(self, frames: Iterable[RegisteredFrame]) -> Iterator[PerceivedFrame]:
-        """Each frame once, in order, its movers labelled and placed."""
-        for registered in frames:
-            yield from self._push(registered)
+    def run(self, frames: Iterable[SightedFrame]) -> Iterator[PerceivedFrame]:
+        """Each frame once, in order, its movers labelled and placed; nobody has watched it yet."""
+        for frame in self._advice.seen(frames):
+            yield from self._push(frame)
         if self._since_window and len(self._waiting) > 1:
             self._look()
         while self._waiting:
             yield self._release()
 
-    def _push(self, registered: RegisteredFrame) -> Iterator[PerceivedFrame]:
-        if self._viewpoint is None:
-            self._viewpoint = find_viewpoint(registered.frame.points)
-        frame = SightedFrame(registered, self._settings, self._viewpoint)
+    def _push(self, frame: SightedFrame) -> Iterator[PerceivedFrame]:
         for other in list(self._waiting)[-(self._settings.window - 1) :]:
             frame.watch(other)
             other.watch(frame)
         self._waiting.append(frame)
-        self._advice.see(frame)
         self._since_window += 1
         if len(self._waiting) < self._settings.window or not self._is_due():
             return

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from typing import Any
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from lidaraccum.geometry.clustering import dense_groups
 from lidaraccum.model.reading import FrameReading
+from lidaraccum.pipeline.advice import Leads
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.object_ids import ObjectIds
@@ -37,8 +39,8 @@ class NetworkAdvice:
         reader: The network.
         settings: What counts as a mover.
         ids: Where the ids of what stands come from.
-        worker: Encodes frames, one after another, while the next are registered: nobody asks for
-            them before the window is full. What encoding raises is raised then.
+        worker: Encodes frames, a few ahead of those that are worked on, and looks at windows while
+            free space is asked. What either raises is raised when leads are asked for.
     """
 
     def __init__(
@@ -54,13 +56,22 @@ class NetworkAdvice:
         self._tubes: list[Tube] = []
         self._next_unread = 0
 
-    def see(self, frame: SightedFrame) -> None:
-        """Have the frame encoded."""
-        encoded = self._worker.submit(self._reader.read, frame.registered.frame)
-        self._encoded[frame.index] = encoded
+    def seen(self, frames: Iterable[SightedFrame]) -> Iterator[SightedFrame]:
+        """Have the frames encoded: those of the next window while the movers of one are found."""
+        waiting: deque[SightedFrame] = deque()
+        for frame in frames:
+            encoded = self._worker.submit(self._reader.read, frame.registered.frame)
+            self._encoded[frame.index] = encoded
+            waiting.append(frame)
+            if len(waiting) > self._settings.stride:
+                yield waiting.popleft()
+        yield from waiting
 
-    def leads(self, window: Sequence[SightedFrame]) -> list[Lead]:
+    def leads(self, window: Sequence[SightedFrame]) -> Leads:
         """What the network sees moving, where the window shows it, the largest first."""
+        return self._worker.submit(self._look, window).result
+
+    def _look(self, window: Sequence[SightedFrame]) -> list[Lead]:
         for run in self._unread_runs(window):
             encoded = [self._encoded[frame.index].result() for frame in run]
             poses = np.stack([frame.world_from_sensor for frame in run])
@@ -69,8 +80,8 @@ class NetworkAdvice:
                 self._note(frame, one)
             self._tubes += find_tubes(run, reading, self._reader, self._settings)
         self._next_unread = window[-1].index + 1
-        recent = {frame.index for frame in window[-SPAN:]}
-        self._encoded = {index: one for index, one in self._encoded.items() if index in recent}
+        oldest = window[-SPAN:][0].index
+        self._encoded = {index: one for index, one in self._encoded.items() if index >= oldest}
         shown = {frame.index for frame in window}
         self._tubes = [tube for tube in self._tubes if shown & tube.picked.keys()]
         leads = [tube.lead(window) for tube in self._tubes]

@@ -7,10 +7,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 from lidaraccum.data.perceived import PerceivedFrame
 from lidaraccum.data.registered import RegisteredFrame
+from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import BALANCED, MotionSettings
 from lidaraccum.pipeline.mover_stream import MoverStream
 from lidaraccum.pipeline.network_advice import NetworkAdvice
 from lidaraccum.pipeline.object_ids import ObjectIds
+from lidaraccum.pipeline.sighting import Sighter
 from lidaraccum.pipeline.tubes import Reader
 
 
@@ -33,6 +35,10 @@ class NetworkLed:
 
     def perceive(self, frames: Iterable[RegisteredFrame]) -> Iterator[PerceivedFrame]:
         """Each frame once, in order, its movers labelled and placed, what stands named."""
+        return self.perceive_sighted(Sighter(self._settings).all(frames))
+
+    def perceive_sighted(self, frames: Iterable[SightedFrame]) -> Iterator[PerceivedFrame]:
+        """As `perceive`, of frames that a `Sighter` of the same settings has sighted."""
         ids = ObjectIds()
         worker = ThreadPoolExecutor(max_workers=1)
         try:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lidaraccum.pipeline.advice import Leads, no_leads
 from lidaraccum.pipeline.courses import are_alike
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.gathering import WHOLE_GROWTH, with_middle
@@ -46,7 +47,7 @@ def find_objects(
     frames: Sequence[SightedFrame],
     settings: MotionSettings,
     expected: Sequence[Expectation] = (),
-    leads: Sequence[Lead] = (),
+    leads: Leads = no_leads,
 ) -> list[WindowObject]:
     """The movers of a window whose frames have watched one another.
 
@@ -55,19 +56,19 @@ def find_objects(
         settings: What counts as a mover.
         expected: Movers of earlier windows: their motions are tried first, and nothing else is
             where they explain the points.
-        leads: Proposed movers. They must show as much as any other; those whose proposer is sure
-            are asked once more, last, on less evidence.
+        leads: Tells of proposed movers, once free space has been asked. They must show as much as
+            any other; those whose proposer is sure are asked once more, last, on less evidence.
     """
     suspects = find_suspects(frames, settings)
     free = _accused(suspects, frames, settings, expected)
     proposed = _Claimed(frames)
-    looks = [look_at(lead.suspect, frames, settings) for lead in leads]
-    for lead, first in zip(leads, looks, strict=True):
+    looked = [(lead, look_at(lead.suspect, frames, settings)) for lead in leads()]
+    for lead, first in looked:
         if proposed.share(lead.suspect) <= CLAIMED_SHARE:
             found = _explain_lead(lead, frames, settings, expected, first)
             proposed.add(_outlined(found, lead, frames) if found else None)
     movers = _settle(proposed.objects, free, frames, BETTER_SHARE)
-    for lead, first in zip(leads, looks, strict=True):
+    for lead, first in looked:
         if lead.trust >= LIKELY and _Claimed(frames, movers).share(lead.suspect) <= KNOWN_SHARE:
             trusting = settings.trusting(lead.trust)
             found = _explain_lead(lead, frames, trusting, expected, first)

@@ -22,6 +22,9 @@ SEARCHES = 3
 STEPS = 2
 """The surface near the points is looked for so often, and so many steps are taken each time."""
 
+AT_REST_M = 0.01
+"""Not again where the steps since the last time moved no point farther."""
+
 ACROSS_M = 0.03
 ALONG_M = 0.6
 """A point is this sure to lie on the surface near it, and this sure of its place along it."""
@@ -119,12 +122,15 @@ class ObjectShape:
         before = surface.residual_m
         total = np.zeros(4)
         for search in range(SEARCHES):
+            start = surface.place
             if search:
-                surface = self._surface_at(surface.place.T)
+                surface = self._surface_at(start.T)
             for _ in range(STEPS):
                 total = total + surface.step(total)
                 moved = rigid.transform(_level_motion(total), chosen)
                 surface = replace(surface, place=moved.T)
+            if np.abs(surface.place - start).max() < AT_REST_M:
+                break
         too_far = np.hypot(total[0], total[1]) > MAX_SHIFT_M or abs(total[3]) > MAX_TURN
         if too_far or not surface.residual_m < before:
             return ShapeFit(np.eye(4), before)

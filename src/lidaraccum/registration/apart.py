@@ -7,10 +7,11 @@ import os
 import signal
 import traceback
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +32,24 @@ def is_worthwhile(frames: int, busy: int) -> bool:
     return frames >= WORTH_FRAMES and (cores or 1) > busy
 
 
-class Registrar:
-    """A process that registers the frames of one sequence.
+class OfFrame(Protocol):
+    """Something made of a registered frame, which it holds."""
+
+    registered: RegisteredFrame
+
+
+Made = TypeVar("Made", bound=OfFrame)
+
+
+@dataclass
+class Plain:
+    """A registered frame, of which nothing more is made."""
+
+    registered: RegisteredFrame
+
+
+class Registrar(Generic[Made]):
+    """A process that registers the frames of one sequence and makes something of each.
 
     It starts at once, so that it is ready when the first frame has been read. It ends with
     `close`, with the program, and also when the program is killed.
@@ -40,22 +57,30 @@ class Registrar:
 
     def __init__(
         self,
+        make: Callable[[RegisteredFrame], Made],
         settings: RegistrationSettings | None = None,
         given: NDArray[np.float64] | None = None,
     ) -> None:
-        """Start the process; ``settings`` and ``given`` are those of `register`."""
+        """Start the process.
+
+        Args:
+            make: What to make of each registered frame there, such as `Plain`; picklable, as is
+                what it makes.
+            settings: Those of `register`.
+            given: Poses, as `register` takes them.
+        """
         self._settings = settings or RegistrationSettings()
         context = multiprocessing.get_context("spawn")
         self._pipe, its = context.Pipe()
         self._process = context.Process(
-            target=_serve, args=(its, self._settings, given), name="registration", daemon=True
+            target=_serve, args=(its, make, self._settings, given), name="registration", daemon=True
         )
         with _interrupts_held_back():
             self._process.start()
         its.close()
 
-    def register(self, frames: Iterable[Frame]) -> Iterator[RegisteredFrame]:
-        """As `odometry.register`, once; frames leave in order, each exactly once.
+    def register(self, frames: Iterable[Frame]) -> Iterator[Made]:
+        """As `odometry.register`, once: what is made of the frames, in order, each exactly once.
 
         Raises:
             ProcessLostError: The process has ended before its work was done.
@@ -85,17 +110,18 @@ class Registrar:
             self._answer()  # it may have said why before it ended
             raise
 
-    def _receive(self, frame: Frame) -> RegisteredFrame:
-        registered = self._answer()
-        assert registered is not None
-        if registered.deskewed:
-            frame = frame.with_points(registered.frame.points)
-        return replace(registered, frame=frame)
+    def _receive(self, frame: Frame) -> Made:
+        made = self._answer()
+        assert made is not None
+        if made.registered.deskewed:
+            frame = frame.with_points(made.registered.frame.points)
+        made.registered = replace(made.registered, frame=frame)
+        return made
 
-    def _answer(self) -> RegisteredFrame | None:
-        """What comes next: a frame, or nothing more."""
+    def _answer(self) -> Made | None:
+        """What comes next: what was made of a frame, or nothing more."""
         try:
-            answer: RegisteredFrame | _Failure | None = self._pipe.recv()
+            answer: Made | _Failure | None = self._pipe.recv()
         except (EOFError, ConnectionResetError) as error:
             self._process.join()
             raise ProcessLostError(
@@ -144,14 +170,19 @@ def _bare(frame: Frame) -> Frame:
 
 
 def _serve(
-    pipe: Connection, settings: RegistrationSettings, given: NDArray[np.float64] | None
+    pipe: Connection,
+    make: Callable[[RegisteredFrame], Made],
+    settings: RegistrationSettings,
+    given: NDArray[np.float64] | None,
 ) -> None:
     """What the process does: register what comes, until nothing more does or nobody listens."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it could not be held back
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):
         try:
             for registered in register(iter(pipe.recv, None), settings, given):
-                pipe.send(_answer_of(registered))
+                made = make(registered)
+                made.registered = _without_known(registered)
+                pipe.send(made)
             pipe.send(None)
         except (EOFError, OSError):
             raise
@@ -159,7 +190,7 @@ def _serve(
             pipe.send(_Failure(error, traceback.format_exc()))
 
 
-def _answer_of(registered: RegisteredFrame) -> RegisteredFrame:
+def _without_known(registered: RegisteredFrame) -> RegisteredFrame:
     """A registered frame without what the caller has: its points too, unless they were moved."""
     points = registered.frame.points if registered.deskewed else np.zeros((0, 3), np.float32)
     return replace(registered, frame=Frame(points, registered.frame.stamp))
