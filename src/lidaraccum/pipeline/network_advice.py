@@ -39,8 +39,9 @@ class NetworkAdvice:
         reader: The network.
         settings: What counts as a mover.
         ids: Where the ids of what stands come from.
-        worker: Encodes frames, a few ahead of those that are worked on, and looks at windows while
-            free space is asked. What either raises is raised when leads are asked for.
+        worker: Looks at a window while free space is asked, then encodes the frames of the next
+            while the movers of this one are found and painted. One thing after another; what it
+            raises is raised when leads are asked for.
     """
 
     def __init__(
@@ -51,37 +52,57 @@ class NetworkAdvice:
         self._settings = settings
         self._still = StillObjects(ids)
         self._places = Places()
+        self._unsent: list[SightedFrame] = []
         self._encoded: dict[int, Future[Any]] = {}
         self._readings: dict[int, FrameReading] = {}
         self._tubes: list[Tube] = []
         self._next_unread = 0
 
     def seen(self, frames: Iterable[SightedFrame]) -> Iterator[SightedFrame]:
-        """Have the frames encoded: those of the next window while the movers of one are found."""
+        """Have the frames encoded: those of the next window while one is searched."""
         waiting: deque[SightedFrame] = deque()
         for frame in frames:
-            encoded = self._worker.submit(self._reader.read, frame.registered.frame)
-            self._encoded[frame.index] = encoded
             waiting.append(frame)
+            self._unsent.append(frame)
+            if self._next_unread == 0:
+                self._encode()
             if len(waiting) > self._settings.stride:
                 yield waiting.popleft()
         yield from waiting
 
     def leads(self, window: Sequence[SightedFrame]) -> Leads:
         """What the network sees moving, where the window shows it, the largest first."""
-        return self._worker.submit(self._look, window).result
+        if any(frame is unsent for frame in window for unsent in self._unsent):
+            self._encode()
+        runs = list(self._unread_runs(window))
+        encoded = [[self._encoded[frame.index] for frame in run] for run in runs]
+        oldest = window[-SPAN:][0].index
+        self._encoded = {index: one for index, one in self._encoded.items() if index >= oldest}
+        self._next_unread = window[-1].index + 1
+        looking = self._worker.submit(self._look, window, runs, encoded)
+        self._encode()
+        return looking.result
 
-    def _look(self, window: Sequence[SightedFrame]) -> list[Lead]:
-        for run in self._unread_runs(window):
-            encoded = [self._encoded[frame.index].result() for frame in run]
+    def _encode(self) -> None:
+        """Have the worker encode what it was not given yet."""
+        for frame in self._unsent:
+            encoded = self._worker.submit(self._reader.read, frame.registered.frame)
+            self._encoded[frame.index] = encoded
+        self._unsent.clear()
+
+    def _look(
+        self,
+        window: Sequence[SightedFrame],
+        runs: Sequence[Sequence[SightedFrame]],
+        encoded: Sequence[Sequence[Future[Any]]],
+    ) -> list[Lead]:
+        """The leads of a window, after its runs of frames, encoded, were looked at."""
+        for run, kept in zip(runs, encoded, strict=True):
             poses = np.stack([frame.world_from_sensor for frame in run])
-            reading = self._reader.look(encoded, poses, 0)
+            reading = self._reader.look([one.result() for one in kept], poses, 0)
             for frame, one in zip(run, reading.frames, strict=True):
                 self._note(frame, one)
             self._tubes += find_tubes(run, reading, self._reader, self._settings)
-        self._next_unread = window[-1].index + 1
-        oldest = window[-SPAN:][0].index
-        self._encoded = {index: one for index, one in self._encoded.items() if index >= oldest}
         shown = {frame.index for frame in window}
         self._tubes = [tube for tube in self._tubes if shown & tube.picked.keys()]
         leads = [tube.lead(window) for tube in self._tubes]
