@@ -9,14 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.pipeline.advice import Leads, no_leads
-from lidaraccum.pipeline.courses import are_alike
+from lidaraccum.pipeline.courses import are_alike, turned
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.gathering import WHOLE_GROWTH, with_middle
 from lidaraccum.pipeline.hypotheses import propose
 from lidaraccum.pipeline.joining import join_parts
 from lidaraccum.pipeline.motion_settings import LIKELY, MotionSettings
 from lidaraccum.pipeline.objects import Expectation, FirstLook, WindowObject, explain, look_at
-from lidaraccum.pipeline.suspects import Lead, Suspect, find_suspects
+from lidaraccum.pipeline.suspects import (
+    Lead,
+    Suspect,
+    find_suspects,
+    spread_out,
+    whole_template,
+)
+from lidaraccum.pipeline.verdict import judge_points
 
 EXPECTED_M = 1.5
 """A suspect this near to where a mover must be by now may be it."""
@@ -33,8 +40,11 @@ OUTLINE_SHARE = 0.6
 WHOLE_SHARE = 0.85
 BETTER_SHARE = 0.7
 """A proposed mover stands for others that it overlaps and that move like it if it has at least the
-first share of their points, for others that move otherwise if it explains the second share of what
-they do; else it is but a part of them, or wrong."""
+first share of their points, for others that move otherwise if it saves the second share of what
+they do, on the points of all; else it is but a part of them, or wrong."""
+
+COMPARED_POINTS = 160
+"""So many points of a frame at most are asked whose motion saves more."""
 
 ALIKE_MPS = 0.8
 ALIKE_SHARE = 0.1
@@ -67,7 +77,7 @@ def find_objects(
         if proposed.share(lead.suspect) <= CLAIMED_SHARE:
             found = _explain_lead(lead, frames, settings, expected, first)
             proposed.add(_outlined(found, lead, frames) if found else None)
-    movers = _settle(proposed.objects, free, frames, BETTER_SHARE)
+    movers = _settle(proposed.objects, free, frames, settings, BETTER_SHARE)
     for lead, first in looked:
         if lead.trust >= LIKELY and _Claimed(frames, movers).share(lead.suspect) <= KNOWN_SHARE:
             trusting = settings.trusting(lead.trust)
@@ -75,9 +85,9 @@ def find_objects(
             if found is None:  # its proposer may be right that it moves and wrong how
                 proposals = propose(lead.suspect, suspects, frames, settings)
                 found = explain(lead.suspect, proposals, frames, trusting, first=first)
-            movers = (
-                _settle([_meant(found, lead, frames)], movers, frames, 1.0) if found else movers
-            )
+            if found is not None:
+                meant = _meant(found, lead, frames)
+                movers = _settle([meant], movers, frames, settings, WHOLE_SHARE)
     return [_filled(one, frames) for one in join_parts(movers, frames, settings)]
 
 
@@ -121,6 +131,7 @@ def _settle(
     proposed: Sequence[WindowObject],
     others: Sequence[WindowObject],
     frames: Sequence[SightedFrame],
+    settings: MotionSettings,
     share: float,
 ) -> list[WindowObject]:
     """Movers without those that overlap: a proposed one, or those it overlaps.
@@ -129,22 +140,61 @@ def _settle(
         proposed: Movers by a proposer's word.
         others: Movers known already.
         frames: The window.
-        share: Of what others explain by another motion, a proposed one explains so much.
+        settings: What costs are measured by.
+        share: Of what others save by another motion, a proposed one saves so much.
     """
     kept, left = [], list(others)
     for one in proposed:
         rivals = [other for other in left if _overlap(one, other)]
-        if _stands_for(one, rivals, share):
+        if _stands_for(one, rivals, frames, settings, share):
             kept.append(_with_accused(one, rivals, frames))
             left = [other for other in left if not any(other is rival for rival in rivals)]
     return sorted(kept + left, key=lambda one: -max(map(len, one.picked.values()), default=0))
 
 
-def _stands_for(one: WindowObject, rivals: Sequence[WindowObject], share: float) -> bool:
+def _stands_for(
+    one: WindowObject,
+    rivals: Sequence[WindowObject],
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+    share: float,
+) -> bool:
     """Whether a proposed mover is better than those it overlaps: its parts, or something else."""
     if all(_moves_alike(one, rival) for rival in rivals):
         return _size(one) >= WHOLE_SHARE * sum(map(_size, rivals))
-    return _saved(one) >= share * sum(map(_saved, rivals))
+    return _saved([one], rivals, frames, settings) >= share * _saved(
+        rivals, [one], frames, settings
+    )
+
+
+def _saved(
+    movers: Sequence[WindowObject],
+    others: Sequence[WindowObject],
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+) -> float:
+    """How much less points of movers and of others cost, a point, where only the first move."""
+    frame = max(frames, key=lambda frame: _size_in(frame, [*movers, *others]))
+    picked = np.unique(
+        np.concatenate([one.picked.get(frame.index, _NONE) for one in [*movers, *others]])
+    )
+    spread = spread_out(frame, picked)
+    asked = spread[:: len(spread) // COMPARED_POINTS + 1]
+    template = whole_template(frame, asked)
+    velocities = [turned(one.velocity, one.turn * (frame.stamp - one.stamp)) for one in movers]
+    turns = [one.turn for one in movers]
+    cost = judge_points(
+        template, np.array([np.zeros(3), *velocities]), frames, settings, np.array([0.0, *turns])
+    )
+    moved = cost[0].copy()
+    for one, its in zip(movers, cost[1:], strict=True):
+        own = np.isin(asked, one.picked.get(frame.index, _NONE))
+        moved[own] = its[own]
+    return float((cost[0] - moved).mean())
+
+
+def _size_in(frame: SightedFrame, movers: Sequence[WindowObject]) -> int:
+    return sum(len(one.picked.get(frame.index, _NONE)) for one in movers)
 
 
 def _with_accused(
@@ -167,11 +217,6 @@ def _moves_alike(one: WindowObject, other: WindowObject) -> bool:
 
 def _size(one: WindowObject) -> int:
     return sum(map(len, one.picked.values()))
-
-
-def _saved(one: WindowObject) -> float:
-    """How much cheaper the motion makes all its points than standing still."""
-    return one.margin * _size(one)
 
 
 def _overlap(one: WindowObject, other: WindowObject) -> bool:
