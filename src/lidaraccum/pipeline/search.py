@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.pipeline.advice import Leads, no_leads
-from lidaraccum.pipeline.courses import are_alike, turned
+from lidaraccum.pipeline.courses import are_alike, turned, way
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.gathering import WHOLE_GROWTH, with_middle
 from lidaraccum.pipeline.hypotheses import propose
@@ -42,6 +43,9 @@ BETTER_SHARE = 0.7
 """A proposed mover stands for others that it overlaps and that move like it if it has at least the
 first share of their points, for others that move otherwise if it saves the second share of what
 they do, on the points of all; else it is but a part of them, or wrong."""
+
+SURE_SHARE = 0.85
+"""As much must one save whose proposer is sure, on less evidence."""
 
 COMPARED_POINTS = 160
 """So many points of a frame at most are asked whose motion saves more."""
@@ -87,7 +91,7 @@ def find_objects(
                 found = explain(lead.suspect, proposals, frames, trusting, first=first)
             if found is not None:
                 meant = _meant(found, lead, frames)
-                movers = _settle([meant], movers, frames, settings, WHOLE_SHARE)
+                movers = _settle([meant], movers, frames, settings, SURE_SHARE)
     return [_filled(one, frames) for one in join_parts(movers, frames, settings)]
 
 
@@ -162,35 +166,46 @@ def _stands_for(
     """Whether a proposed mover is better than those it overlaps: its parts, or something else."""
     if all(_moves_alike(one, rival) for rival in rivals):
         return _size(one) >= WHOLE_SHARE * sum(map(_size, rivals))
-    return _saved([one], rivals, frames, settings) >= share * _saved(
-        rivals, [one], frames, settings
-    )
+    mine, theirs = _savings(one, rivals, frames, settings)
+    return mine >= share * theirs
 
 
-def _saved(
-    movers: Sequence[WindowObject],
-    others: Sequence[WindowObject],
+def _savings(
+    one: WindowObject,
+    rivals: Sequence[WindowObject],
     frames: Sequence[SightedFrame],
     settings: MotionSettings,
-) -> float:
-    """How much less points of movers and of others cost, a point, where only the first move."""
-    frame = max(frames, key=lambda frame: _size_in(frame, [*movers, *others]))
-    picked = np.unique(
-        np.concatenate([one.picked.get(frame.index, _NONE) for one in [*movers, *others]])
-    )
-    spread = spread_out(frame, picked)
+) -> tuple[float, float]:
+    """How much less points cost than standing if only a mover moves, and if only its rivals do.
+
+    On the points of all of them, in the frame that shows most of both sides.
+    """
+    frame = max(frames, key=lambda frame: min(_size_in(frame, [one]), _size_in(frame, rivals)))
+    spread = spread_out(frame, _together([one, *rivals], frame))
     asked = spread[:: len(spread) // COMPARED_POINTS + 1]
     template = whole_template(frame, asked)
-    velocities = [turned(one.velocity, one.turn * (frame.stamp - one.stamp)) for one in movers]
-    turns = [one.turn for one in movers]
-    cost = judge_points(
-        template, np.array([np.zeros(3), *velocities]), frames, settings, np.array([0.0, *turns])
-    )
-    moved = cost[0].copy()
-    for one, its in zip(movers, cost[1:], strict=True):
-        own = np.isin(asked, one.picked.get(frame.index, _NONE))
-        moved[own] = its[own]
-    return float((cost[0] - moved).mean())
+
+    def cost(velocity: NDArray[np.float64], turn: float, pivot: NDArray[np.float64]) -> Any:
+        about = replace(template, pivot=pivot)
+        return judge_points(about, velocity[None], frames, settings, np.array([turn]))[0]
+
+    def saved(movers: Sequence[WindowObject]) -> float:
+        moved = standing.copy()
+        for mover in movers:
+            seconds = frame.stamp - mover.stamp
+            velocity = turned(mover.velocity, mover.turn * seconds)
+            centre = mover.centre + way(mover.velocity, mover.turn, seconds)
+            own = np.isin(asked, mover.picked.get(frame.index, _NONE))
+            moved[own] = cost(velocity, mover.turn, centre)[own]
+        return float((standing - moved).mean())
+
+    standing = cost(np.zeros(3), 0.0, template.pivot)
+    return saved([one]), saved(rivals)
+
+
+def _together(movers: Sequence[WindowObject], frame: SightedFrame) -> NDArray[np.int64]:
+    """A frame's obstacles (K,) that are some mover's."""
+    return np.unique(np.concatenate([one.picked.get(frame.index, _NONE) for one in movers]))
 
 
 def _size_in(frame: SightedFrame, movers: Sequence[WindowObject]) -> int:
