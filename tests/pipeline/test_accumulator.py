@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,11 @@ from lidaraccum.data.accumulation import MOVING, Accumulation
 from lidaraccum.data.frame import Box, Frame, Labels
 from lidaraccum.errors import InputError, SettingsError
 from lidaraccum.geometry import rigid
+from lidaraccum.model.checkpoint import save_network
+from lidaraccum.model.network import build_network
+from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.pipeline.accumulator import AccumulateSettings, Accumulator, accumulate
-from lidaraccum.pipeline.label_free import LabelFree
+from lidaraccum.pipeline.perception import GivenLabels
 from lidaraccum.pipeline.selection import SelectionSettings
 
 MOVER, RATE_HZ = 7, 10.0
@@ -116,20 +120,46 @@ def test_every_point_comes_out_once_in_order(sequence: DriveWithMover) -> None:
     assert set(np.unique(result.label)) == {0}
 
 
-@pytest.mark.parametrize("named", [True, False])
-def test_a_process_more_changes_nothing(sequence: DriveWithMover, named: bool) -> None:
-    """Whether it makes frames ready for free space, or a perceiver came along that does."""
-    settings = AccumulateSettings(method="label-free", preset="aggressive")
-    perceiver = None if named else LabelFree()
-    one, two = (
-        list(Accumulator(sequence, settings, perceiver=perceiver, processes=count).frames())
-        for count in (1, 2)
-    )
+@dataclass(frozen=True)
+class Recorded:
+    """Frames in memory."""
+
+    frames: list[Frame]
+    poses: np.ndarray | None = None
+    name: str = "recorded"
+    rate_hz: float = RATE_HZ
+    crs_wkt: str | None = None
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    def __getitem__(self, index: int, /) -> Frame:
+        return self.frames[index]
+
+
+@pytest.mark.parametrize("method", ["label-free", "network"])
+def test_a_process_more_changes_nothing(
+    look: Any, new_mover: Any, tmp_path: Path, method: str
+) -> None:
+    small = NetworkSettings(extent_m=32.0, base_widths=(16, 24, 32), motion_widths=(32, 48))
+    save_network(build_network(small, seed=3), tmp_path / "weights.safetensors")
+    weights = tmp_path / "weights.safetensors" if method == "network" else None
+    settings = AccumulateSettings(method=method, weights=weights)
+    mover = new_mover(low=(12.0, -2.0, 0.0), size=(4.0, 1.8, 1.5), velocity=(4.0, 0.0, 0.0))
+    sequence = Recorded([one.frame for one in look([mover], count=15).frames])
+    one, two = (list(Accumulator(sequence, settings, processes=count).frames()) for count in (1, 2))
     assert any((frame.label == MOVING).any() for frame in one)
     for here, there in zip(one, two, strict=True):
         np.testing.assert_array_equal(here.points, there.points)
         np.testing.assert_array_equal(here.label, there.label)
         np.testing.assert_array_equal(here.confidence, there.confidence)
+
+
+def test_a_perceiver_that_looks_for_nothing_has_a_process_more(sequence: DriveWithMover) -> None:
+    settings = AccumulateSettings(method="label-free")
+    run = Accumulator(sequence, settings, perceiver=GivenLabels(sequence), processes=2)
+    labels = np.concatenate([frame.label for frame in run.frames()])
+    np.testing.assert_array_equal(labels, oracle(sequence).label)
 
 
 def test_one_frame_is_too_few(sequence: DriveWithMover) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from lidaraccum.errors import InputError
 from lidaraccum.pipeline.ahead import FRAMES_AHEAD, ahead
+from lidaraccum.pipeline.motion_settings import PRESETS
 
 
 def numbers(made: list[int], broken: int = -1) -> Iterator[int]:
@@ -31,6 +32,10 @@ def test_no_more_than_a_few_are_made_ahead() -> None:
     next(items)
     items.close()
     assert max(made) <= FRAMES_AHEAD
+
+
+def test_a_stride_of_frames_is_made_while_a_window_is_searched() -> None:
+    assert all(settings.stride <= FRAMES_AHEAD for settings in PRESETS.values())
 
 
 def test_an_error_comes_when_its_item_is_due() -> None:

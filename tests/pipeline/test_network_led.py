@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -312,6 +312,40 @@ def test_an_error_of_the_network_reaches_the_caller(busy_street: Any) -> None:
     stamp = busy_street.frames[4].frame.stamp
     with pytest.raises(MemoryError, match=f"frame {stamp}"):
         perceive(busy_street, Broken(stamp))
+
+
+class Blind(Liar):
+    """Can read frames and cannot look at the window that ends with the frame of that stamp."""
+
+    def look(
+        self, encoded: Sequence[Frame], world_from_sensor: np.ndarray, target: int
+    ) -> WindowReading:
+        if encoded[-1].stamp == self.speed_mps:
+            raise MemoryError(f"no room for window {encoded[-1].stamp}")
+        return super().look(encoded, world_from_sensor, target)
+
+
+def test_an_error_in_looking_reaches_the_caller(busy_street: Any) -> None:
+    stamp = busy_street.frames[-1].frame.stamp
+    with pytest.raises(MemoryError, match=f"window {stamp}"):
+        perceive(busy_street, Blind(stamp))
+
+
+@dataclass(frozen=True)
+class Counting(Liar):
+    """Notes the frames it reads."""
+
+    read_stamps: list[float] = field(default_factory=list)
+
+    def read(self, frame: Frame) -> Frame:
+        self.read_stamps.append(frame.stamp)
+        return frame
+
+
+def test_each_frame_is_read_once_in_order(busy_street: Any) -> None:
+    reader = Counting(2.0)
+    frames = perceive(busy_street, reader)
+    assert reader.read_stamps == [frame.registered.frame.stamp for frame in frames]
 
 
 def test_no_thread_outlives_its_caller(busy_street: Any) -> None:

@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Iterator
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -67,6 +68,15 @@ def test_given_poses_are_used_and_their_number_counts_there_too(straight: Any) -
     finally:
         short.close()
         whole.close()
+
+
+def test_what_cannot_be_made_there_is_told_here(straight: Any) -> None:
+    registrar: Registrar[Plain] = Registrar(attrgetter("no_such_thing"))
+    try:
+        with pytest.raises(AttributeError, match="no_such_thing"):
+            list(registrar.register(straight.frames))
+    finally:
+        registrar.close()
 
 
 def test_a_process_that_is_killed_is_told(registrar: Registrar[Plain], straight: Any) -> None:

@@ -143,7 +143,7 @@ processes_option = click.option(
     type=click.IntRange(1, 2),
     metavar="1|2",
     show_default="2 where there are cores and frames enough",
-    help="With 2, frames find their place in a process of its own.",
+    help="With 2, frames find their place and are made ready in a process of its own.",
 )
 
 weights_option = click.option(

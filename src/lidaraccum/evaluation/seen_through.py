@@ -10,9 +10,8 @@ import numpy as np
 from lidaraccum.data.accumulation import BACKGROUND, MOVING
 from lidaraccum.data.perceived import PerceivedFrame
 from lidaraccum.data.registered import RegisteredFrame
-from lidaraccum.geometry.viewpoint import find_viewpoint
-from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import BALANCED, MotionSettings
+from lidaraccum.pipeline.sighting import Sighter
 
 LEAST_WITNESSES = 2
 """So many other frames saw through a point that moves, and more than saw something there."""
@@ -29,9 +28,7 @@ class SeenThrough:
 
     def perceive(self, frames: Iterable[RegisteredFrame]) -> Iterator[PerceivedFrame]:
         """All frames at once: every one looks at every other."""
-        windowed = list(frames)
-        viewpoint = find_viewpoint(windowed[0].frame.points) if windowed else None
-        sighted = [SightedFrame(registered, self._settings, viewpoint) for registered in windowed]
+        sighted = list(Sighter(self._settings).all(frames))
         for one, other in permutations(sighted, 2):
             one.watch(other)
         least = min(LEAST_WITNESSES, len(sighted) - 1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -43,8 +43,8 @@ METHODS = ("network", "label-free", "ego-only", "oracle")
 that came with the sequence."""
 
 
-SIGHTING_METHODS = ("network", "label-free")
-"""Those that look for free space."""
+SIGHTING = (LabelFree, NetworkLed)
+"""Perceivers that look for free space."""
 
 
 def default_method(weights: Path | None = None) -> str:
@@ -134,12 +134,13 @@ class Accumulator:
         self._sequence = sequence
         self._settings = settings
         self._reference_index = reference_index(settings.reference, sequence)
-        self._sights = perceiver is None and settings.method in SIGHTING_METHODS
+        self._perceiver = perceiver or choose_perceiver(settings, sequence)
         self._registrar: Registrar[Any] | None = None
         if processes > 1 and registered is None:
-            make = Sighter(PRESETS[settings.preset]) if self._sights else Plain
+            make: Callable[[RegisteredFrame], Any] = Plain
+            if isinstance(self._perceiver, SIGHTING):
+                make = Sighter(self._perceiver.settings)
             self._registrar = Registrar(make, settings.registration, sequence.poses)
-        self._perceiver = perceiver or choose_perceiver(settings, sequence)
         self.weights = self._perceiver.weights if isinstance(self._perceiver, NetworkLed) else None
         self._registered = registered
         self._selection = Selection(settings.selection)
@@ -184,7 +185,7 @@ class Accumulator:
         # Reading is no stage that anybody waits for.
         made = ahead(self._registrar.register(ahead(self._read())))
         ready = self.clock.timed("register", made)
-        if self._sights and isinstance(self._perceiver, (LabelFree, NetworkLed)):
+        if isinstance(self._perceiver, SIGHTING):
             return self._perceiver.perceive_sighted(ready)
         return self._perceiver.perceive(one.registered for one in ready)
 

@@ -24,7 +24,7 @@ class Advice(Protocol):
     def seen(self, frames: Iterable[SightedFrame]) -> Iterator[SightedFrame]:
         """Take the frames in and hand them on, in order; a few are taken in before."""
 
-    def leads(self, window: Sequence[SightedFrame]) -> Leads:
+    def look(self, window: Sequence[SightedFrame]) -> Leads:
         """Begin to look at a window of frames that were seen; to be asked before the next."""
 
     def name_still(self, frame: SightedFrame, canvas: Canvas) -> None:
@@ -38,7 +38,7 @@ class NoAdvice:
         """The frames."""
         return iter(frames)
 
-    def leads(self, window: Sequence[SightedFrame]) -> Leads:
+    def look(self, window: Sequence[SightedFrame]) -> Leads:
         """None."""
         return no_leads
 

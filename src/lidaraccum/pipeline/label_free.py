@@ -21,12 +21,12 @@ class LabelFree:
     """
 
     def __init__(self, settings: MotionSettings = BALANCED) -> None:
-        self._settings = settings
+        self.settings = settings
 
     def perceive(self, frames: Iterable[RegisteredFrame]) -> Iterator[PerceivedFrame]:
         """Each frame once, in order, its movers labelled and placed."""
-        return self.perceive_sighted(Sighter(self._settings).all(frames))
+        return self.perceive_sighted(Sighter(self.settings).all(frames))
 
     def perceive_sighted(self, frames: Iterable[SightedFrame]) -> Iterator[PerceivedFrame]:
         """As `perceive`, of frames that a `Sighter` of the same settings has sighted."""
-        return MoverStream(self._settings, NoAdvice()).run(frames)
+        return MoverStream(self.settings, NoAdvice()).run(frames)

@@ -45,7 +45,7 @@ class MoverStream:
         self._since_window = 0
 
     def run(self, frames: Iterable[SightedFrame]) -> Iterator[PerceivedFrame]:
-        """Each frame once, in order, its movers labelled and placed; nobody has watched it yet."""
+        """Of frames that nobody has watched yet each once, in order, movers labelled and placed."""
         for frame in self._advice.seen(frames):
             yield from self._push(frame)
         if self._since_window and len(self._waiting) > 1:
@@ -72,7 +72,7 @@ class MoverStream:
     def _look(self) -> None:
         window = list(self._waiting)[-self._settings.window :]
         expected = [track.expectation for track in self._association.tracks]
-        leads = self._advice.leads(window)
+        leads = self._advice.look(window)
         found = find_objects(window, self._settings, expected, leads)
         if _is_pose_wrong(found, window):
             found = []

@@ -64,22 +64,21 @@ class NetworkAdvice:
         for frame in frames:
             waiting.append(frame)
             self._unsent.append(frame)
-            if self._next_unread == 0:
+            is_before_first_window = self._next_unread == 0
+            if is_before_first_window:
                 self._encode()
             if len(waiting) > self._settings.stride:
                 yield waiting.popleft()
         yield from waiting
 
-    def leads(self, window: Sequence[SightedFrame]) -> Leads:
-        """What the network sees moving, where the window shows it, the largest first."""
-        if any(frame is unsent for frame in window for unsent in self._unsent):
-            self._encode()
+    def look(self, window: Sequence[SightedFrame]) -> Leads:
+        """Have the window looked at, all of whose frames were given to be encoded by `seen`."""
         runs = list(self._unread_runs(window))
         encoded = [[self._encoded[frame.index] for frame in run] for run in runs]
         oldest = window[-SPAN:][0].index
         self._encoded = {index: one for index, one in self._encoded.items() if index >= oldest}
         self._next_unread = window[-1].index + 1
-        looking = self._worker.submit(self._look, window, runs, encoded)
+        looking = self._worker.submit(self._leads, window, runs, encoded)
         self._encode()
         return looking.result
 
@@ -90,13 +89,13 @@ class NetworkAdvice:
             self._encoded[frame.index] = encoded
         self._unsent.clear()
 
-    def _look(
+    def _leads(
         self,
         window: Sequence[SightedFrame],
         runs: Sequence[Sequence[SightedFrame]],
         encoded: Sequence[Sequence[Future[Any]]],
     ) -> list[Lead]:
-        """The leads of a window, after its runs of frames, encoded, were looked at."""
+        """What the network sees moving in the runs, where the window shows it, largest first."""
         for run, kept in zip(runs, encoded, strict=True):
             poses = np.stack([frame.world_from_sensor for frame in run])
             reading = self._reader.look([one.result() for one in kept], poses, 0)

@@ -17,7 +17,7 @@ from lidaraccum.pipeline.tubes import Reader
 
 
 class NetworkLed:
-    """As `LabelFree`, and the network points out what may move and what could.
+    """As `LabelFree`, a stride farther ahead; the network points out what may move and what could.
 
     Every mover it proposes must explain the points better than standing still, as must what free
     space raises suspicion of: a wrong network costs time. What it takes for movable and does not
@@ -26,7 +26,7 @@ class NetworkLed:
 
     def __init__(self, reader: Reader, settings: MotionSettings = BALANCED) -> None:
         self._reader = reader
-        self._settings = settings
+        self.settings = settings
 
     @property
     def weights(self) -> str:
@@ -35,14 +35,14 @@ class NetworkLed:
 
     def perceive(self, frames: Iterable[RegisteredFrame]) -> Iterator[PerceivedFrame]:
         """Each frame once, in order, its movers labelled and placed, what stands named."""
-        return self.perceive_sighted(Sighter(self._settings).all(frames))
+        return self.perceive_sighted(Sighter(self.settings).all(frames))
 
     def perceive_sighted(self, frames: Iterable[SightedFrame]) -> Iterator[PerceivedFrame]:
         """As `perceive`, of frames that a `Sighter` of the same settings has sighted."""
         ids = ObjectIds()
         worker = ThreadPoolExecutor(max_workers=1)
         try:
-            advice = NetworkAdvice(self._reader, self._settings, ids, worker)
-            yield from MoverStream(self._settings, advice, ids).run(frames)
+            advice = NetworkAdvice(self._reader, self.settings, ids, worker)
+            yield from MoverStream(self.settings, advice, ids).run(frames)
         finally:
             worker.shutdown(cancel_futures=True)

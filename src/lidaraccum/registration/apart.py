@@ -1,4 +1,4 @@
-"""Registration in a process of its own: what else is done with the frames has a core to itself."""
+"""Registration, and making frames ready for what follows, in a process of its own."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ def is_worthwhile(frames: int, busy: int) -> bool:
     return frames >= WORTH_FRAMES and (cores or 1) > busy
 
 
-class OfFrame(Protocol):
+class OfRegistered(Protocol):
     """Something made of a registered frame, which it holds."""
 
     registered: RegisteredFrame
 
 
-Made = TypeVar("Made", bound=OfFrame)
+Made = TypeVar("Made", bound=OfRegistered)
 
 
 @dataclass
