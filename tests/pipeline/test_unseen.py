@@ -12,6 +12,9 @@ from lidaraccum.data.accumulation import MOVING
 from lidaraccum.data.registered import RegisteredFrame
 from lidaraccum.geometry import rigid
 from lidaraccum.pipeline.label_free import LabelFree
+from lidaraccum.registration.odometry import register
+from lidaraccum.simulation.drive import simulate
+from lidaraccum.simulation.windows import held_out_settings
 
 
 def found(frames: Sequence[RegisteredFrame], on: Sequence[np.ndarray]) -> tuple[float, float]:
@@ -47,3 +50,14 @@ def test_a_mover_keeps_what_is_as_close_as_the_carrier(look: Any, new_mover: Any
     assert np.concatenate(near).sum() > 500
     share, _ = found(street.frames, near)
     assert share > 0.5
+
+
+def test_dense_traffic_moves_though_a_pose_is_doubtful() -> None:
+    """A motorway on which a third of what stands out goes; the rest does not go along with it."""
+    drive = simulate(held_out_settings(141, 5))
+    frames = list(register(drive[index] for index in range(len(drive))))
+    assert any(frame.quality.doubts for frame in frames)
+    moving = np.concatenate([frame.label == MOVING for frame in LabelFree().perceive(frames)])
+    truth = np.concatenate([drive.labels(index).dynamic for index in range(len(drive))])
+    assert moving[truth].mean() > 0.7
+    assert moving[~truth].mean() < 0.005

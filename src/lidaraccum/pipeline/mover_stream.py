@@ -6,16 +6,20 @@ import logging
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 
+import numpy as np
+
 from lidaraccum.data.perceived import PerceivedFrame
 from lidaraccum.pipeline.advice import Advice
 from lidaraccum.pipeline.association import Association
-from lidaraccum.pipeline.courses import are_alike
+from lidaraccum.pipeline.courses import are_alike, turned
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.object_ids import ObjectIds
 from lidaraccum.pipeline.objects import WindowObject
 from lidaraccum.pipeline.painting import Canvas, paint_mover
 from lidaraccum.pipeline.search import find_objects
+from lidaraccum.pipeline.suspects import spread_out, whole_template
+from lidaraccum.pipeline.verdict import judge
 
 log = logging.getLogger(__name__)
 
@@ -24,6 +28,14 @@ MOST_MOVING_AS_ONE = 0.1
 AS_ONE_MPS = 1.0
 """Where a pose is doubtful and more than this share of all obstacles of a window seems to move, it
 is the pose that is wrong; where all of it, several things, moves as one, the second share."""
+
+STANDS_CLEARLY = 0.2
+MOVER_SHARE = 0.1
+ASKED_POINTS = 300
+FEWEST_ASKED = 60
+"""But not where the rest does not go along with any of the movers that have so large a share of
+what moves: on a busy motorway most of what stands out is traffic. Going as they do, the rest must
+cost so much more than standing; so many of its points are asked at most, and at least."""
 
 
 class MoverStream:
@@ -74,7 +86,7 @@ class MoverStream:
         expected = [track.expectation for track in self._association.tracks]
         leads = self._advice.look(window)
         found = find_objects(window, self._settings, expected, leads)
-        if _is_pose_wrong(found, window):
+        if _is_pose_wrong(found, window, self._settings):
             found = []
         self._association.link(found, window)
         self._since_window = 0
@@ -91,7 +103,9 @@ class MoverStream:
         return canvas.perceived()
 
 
-def _is_pose_wrong(found: Sequence[WindowObject], window: Sequence[SightedFrame]) -> bool:
+def _is_pose_wrong(
+    found: Sequence[WindowObject], window: Sequence[SightedFrame], settings: MotionSettings
+) -> bool:
     """Whether it is a doubtful pose, not the movers found, that makes things seem to move."""
     doubtful = [frame.index for frame in window if frame.registered.quality.doubts]
     if not doubtful:
@@ -99,11 +113,39 @@ def _is_pose_wrong(found: Sequence[WindowObject], window: Sequence[SightedFrame]
     velocities = [one.velocity for one in found]
     as_one = all(are_alike(velocities[0], other, AS_ONE_MPS, 0.0) for other in velocities[1:])
     most = MOST_MOVING_AS_ONE if len(found) > 1 and as_one else MOST_MOVING
-    moving = sum(len(picked) for one in found for picked in one.picked.values())
+    moving = sum(map(_size, found))
     if moving <= most * sum(len(frame.rows) for frame in window):
+        return False
+    large = [one for one in found if _size(one) > MOVER_SHARE * moving]
+    if large and all(_rest_stands(one, found, window, settings) for one in large):
         return False
     log.warning(
         "nothing is called moving around frame %d: its pose is doubtful, and too much would be",
         doubtful[0],
     )
     return True
+
+
+def _size(one: WindowObject) -> int:
+    return sum(map(len, one.picked.values()))
+
+
+def _rest_stands(
+    one: WindowObject,
+    found: Sequence[WindowObject],
+    window: Sequence[SightedFrame],
+    settings: MotionSettings,
+) -> bool:
+    """Whether what seems to stand clearly does not go as one of the movers seems to."""
+    none = np.zeros(0, dtype=np.int64)
+    frame = max(window, key=lambda frame: len(one.picked.get(frame.index, none)))
+    stands = (frame.met > 0) & (frame.through == 0)
+    for mover in found:
+        stands[mover.picked.get(frame.index, none)] = False
+    spread = spread_out(frame, np.flatnonzero(stands))
+    if len(spread) < FEWEST_ASKED:
+        return False
+    template = whole_template(frame, spread[:: len(spread) // ASKED_POINTS + 1])
+    there = turned(one.velocity, one.turn * (frame.stamp - one.stamp))
+    verdict = judge(template, np.stack([np.zeros(3), there]), window, settings)
+    return bool(verdict.shown[1] < -STANDS_CLEARLY)
