@@ -151,3 +151,14 @@ def test_hardly_any_points_leave_the_sensor_level(count: int) -> None:
     ground = estimate_ground(points)
     assert np.isfinite(ground.heights).all()
     np.testing.assert_allclose(ground.level_from_sensor[:3, :3], np.eye(3), atol=0.5)
+
+
+def test_single_echoes_from_far_below_are_no_ground() -> None:
+    """A crowded wet street: the road shows in a few cells, strays below it in many."""
+    rng = np.random.default_rng(5)
+    road = np.column_stack([rng.uniform(-6, 6, (1200, 2)), rng.normal(-1.6, 0.02, 1200)])
+    things = rng.uniform((-24, -24, -1.2), (24, 24, 1.5), (400, 3)).repeat(25, axis=0)
+    crowd = things + rng.uniform(0, 0.8, (10_000, 3))
+    strays = rng.uniform((-24, -24, -12.0), (24, 24, -2.2), (250, 3))
+    ground = estimate_ground(np.concatenate([road, crowd, strays]))
+    assert ground.level_from_sensor[2, 3] == pytest.approx(1.6, abs=0.1)

@@ -43,10 +43,16 @@ Fewer deeper ones than the first number are strays."""
 THIN_SHARE = 0.1
 RING_M = 4.0
 """So are fewer than this share of what cells of the road hold that are as far away."""
+FEWEST_IN_COMPANY = 12
+"""Where fewer cells hold points that have company, points alone tell the plane, too."""
+LEAST_SHARE = 0.25
+"""A plane with less than this share of the cells of the fullest is no ground, though nothing lies
+below it: single echoes from far below a wet road have nothing below them."""
 LEAST_MOUNT_M = 0.5
 """Where the sensor seems lower than this above the road, its coordinates start elsewhere."""
 
 _CELLS = int(2 * REACH_M / CELL_M)
+_DEPTH_MM = 1 << 17
 _TRIALS = 200
 _CONE_CELLS = 4
 
@@ -86,7 +92,7 @@ def level_by_ground(points: NDArray[Any]) -> tuple[Ground, NDArray[np.float64]]:
 
     Quickest column by column.
     """
-    plane = _fit_plane(_without_strays(_lowest(points)))
+    plane = _fit_plane(_without_strays(_lowest_in_company(points)))
     level_from_sensor = _levelling(plane)
     level = transform(level_from_sensor, points)
     deep = level[:, 2] < -FLAT_M
@@ -161,6 +167,25 @@ def _lowest(points: NDArray[Any], chosen: NDArray[np.bool_] | None = None) -> ND
     return low.reshape(_CELLS, _CELLS)
 
 
+def _lowest_in_company(points: NDArray[Any]) -> NDArray[np.float64]:
+    """Lowest z (G, G) in each cell of points (N, 3) that have company there, NaN without any.
+
+    The lowest of all where few cells have such points.
+    """
+    inside, key = _keys(points)
+    millimetres = np.clip(points[inside, 2] * 1000.0, -_DEPTH_MM, _DEPTH_MM - 1).astype(np.int64)
+    packed = key * (2 * _DEPTH_MM) + millimetres + _DEPTH_MM  # sorts faster than pairs
+    packed.sort()
+    # A cell's heights take half of the numbers at most: nothing of the next one is so near.
+    few = ROAD_POINTS - 1
+    lowest = packed[: len(packed) - few][packed[few:] - packed[:-few] < 1000 * FLAT_M]
+    cell, first = np.unique(lowest // (2 * _DEPTH_MM), return_index=True)
+    low = np.full((_CELLS, _CELLS), np.nan)
+    low.ravel()[cell] = (lowest[first] % (2 * _DEPTH_MM) - _DEPTH_MM) / 1000.0
+    is_near = np.hypot(*centres(reach_m=REACH_M, cell_m=CELL_M)) < PLANE_REACH_M
+    return low if np.isfinite(low[is_near]).sum() >= FEWEST_IN_COMPANY else _lowest(points)
+
+
 def _without_strays(low: NDArray[np.float64]) -> NDArray[np.float64]:
     """Cells far below all cells around them, but for a few as low, blanked."""
     around = np.ones((5, 5), dtype=bool)
@@ -203,7 +228,8 @@ def _vote(rows: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float
     above = z - planes @ rows.T
     on_it = np.count_nonzero(np.abs(above) < PLANE_INLIER_M, axis=1)
     below_it = np.count_nonzero(above < -3 * PLANE_INLIER_M, axis=1)
-    return planes[int(np.argmax(on_it - 2 * below_it))]
+    score = np.where(on_it >= LEAST_SHARE * on_it.max(), on_it - 2 * below_it, -np.inf)
+    return planes[int(np.argmax(score))]
 
 
 def _levelling(plane: NDArray[np.float64]) -> Pose:
