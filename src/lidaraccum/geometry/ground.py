@@ -52,7 +52,8 @@ LEAST_MOUNT_M = 0.5
 """Where the sensor seems lower than this above the road, its coordinates start elsewhere."""
 
 _CELLS = int(2 * REACH_M / CELL_M)
-_DEPTH_MM = 1 << 17
+_STEPS_A_METRE = 1 << 16
+_DEEPEST = 128 * _STEPS_A_METRE
 _TRIALS = 200
 _CONE_CELLS = 4
 
@@ -173,15 +174,18 @@ def _lowest_in_company(points: NDArray[Any]) -> NDArray[np.float64]:
     The lowest of all where few cells have such points.
     """
     inside, key = _keys(points)
-    millimetres = np.clip(points[inside, 2] * 1000.0, -_DEPTH_MM, _DEPTH_MM - 1).astype(np.int64)
-    packed = key * (2 * _DEPTH_MM) + millimetres + _DEPTH_MM  # sorts faster than pairs
+    z = points[inside, 2].astype(np.float64)
+    steps = np.clip(np.floor(_STEPS_A_METRE * z), -_DEEPEST, _DEEPEST - 1).astype(np.int64)
+    packed = key * (2 * _DEEPEST) + steps + _DEEPEST  # sorts faster than pairs
     packed.sort()
-    # A cell's heights take half of the numbers at most: nothing of the next one is so near.
     few = ROAD_POINTS - 1
-    lowest = packed[: len(packed) - few][packed[few:] - packed[:-few] < 1000 * FLAT_M]
-    cell, first = np.unique(lowest // (2 * _DEPTH_MM), return_index=True)
-    low = np.full((_CELLS, _CELLS), np.nan)
-    low.ravel()[cell] = (lowest[first] % (2 * _DEPTH_MM) - _DEPTH_MM) / 1000.0
+    lowest = packed[: len(packed) - few][packed[few:] - packed[:-few] < FLAT_M * _STEPS_A_METRE]
+    cell, first = np.unique(lowest // (2 * _DEEPEST), return_index=True)
+    least = np.full(_CELLS * _CELLS, np.inf)
+    least[cell] = (lowest[first] % (2 * _DEEPEST) - _DEEPEST) / _STEPS_A_METRE
+    in_company = np.zeros(len(points), dtype=bool)
+    in_company[inside] = z >= least[key]
+    low = _lowest(points, in_company)
     is_near = np.hypot(*centres(reach_m=REACH_M, cell_m=CELL_M)) < PLANE_REACH_M
     return low if np.isfinite(low[is_near]).sum() >= FEWEST_IN_COMPANY else _lowest(points)
 
