@@ -148,9 +148,8 @@ def test_moving_the_whole_window_moves_the_answer(network: Network, frames: list
     inner = slice(40, -40)
     off = (second.base - rolled)[:, :, inner, inner].abs()
     filled = network.pillars(second.frames)[:, :, inner, inner].abs().sum(dim=1) > 0
-    # So small a scene tilts a little, which turns the shift by millimetres, and a point so near a
-    # pillar's edge changes pillars; features are of size 1.
-    assert float(off.mean(dim=1)[filled].mean()) < 0.1
+    # A point within rounding of a pillar's edge may change pillars; features are of size 1.
+    assert float(off.mean(dim=1)[filled].mean()) < 0.05
     places = []
     for features in (first, second):
         seen = network.perceive(features, still(3), Windows.single(3))

@@ -52,8 +52,7 @@ LEAST_MOUNT_M = 0.5
 """Where the sensor seems lower than this above the road, its coordinates start elsewhere."""
 
 _CELLS = int(2 * REACH_M / CELL_M)
-_STEPS_A_METRE = 1 << 16
-_DEEPEST = 128 * _STEPS_A_METRE
+_DEEPEST_MM = 1 << 17
 _TRIALS = 200
 _CONE_CELLS = 4
 
@@ -93,7 +92,8 @@ def level_by_ground(points: NDArray[Any]) -> tuple[Ground, NDArray[np.float64]]:
 
     Quickest column by column.
     """
-    plane = _fit_plane(_without_strays(_lowest_in_company(points)))
+    lowest = _without_strays(_lowest(points))
+    plane = _fit_plane(lowest, _without_strays(_lowest_in_company(points)))
     level_from_sensor = _levelling(plane)
     level = transform(level_from_sensor, points)
     deep = level[:, 2] < -FLAT_M
@@ -169,25 +169,17 @@ def _lowest(points: NDArray[Any], chosen: NDArray[np.bool_] | None = None) -> ND
 
 
 def _lowest_in_company(points: NDArray[Any]) -> NDArray[np.float64]:
-    """Lowest z (G, G) in each cell of points (N, 3) that have company there, NaN without any.
-
-    The lowest of all where few cells have such points.
-    """
+    """Lowest z (G, G), to the mm, that has company in its cell of points (N, 3); NaN without."""
     inside, key = _keys(points)
-    z = points[inside, 2].astype(np.float64)
-    steps = np.clip(np.floor(_STEPS_A_METRE * z), -_DEEPEST, _DEEPEST - 1).astype(np.int64)
-    packed = key * (2 * _DEEPEST) + steps + _DEEPEST  # sorts faster than pairs
+    depth = np.clip(np.floor(1000.0 * points[inside, 2]), -_DEEPEST_MM, _DEEPEST_MM - 1)
+    packed = key * (2 * _DEEPEST_MM) + depth.astype(np.int64) + _DEEPEST_MM  # sorts fast
     packed.sort()
     few = ROAD_POINTS - 1
-    lowest = packed[: len(packed) - few][packed[few:] - packed[:-few] < FLAT_M * _STEPS_A_METRE]
-    cell, first = np.unique(lowest // (2 * _DEEPEST), return_index=True)
-    least = np.full(_CELLS * _CELLS, np.inf)
-    least[cell] = (lowest[first] % (2 * _DEEPEST) - _DEEPEST) / _STEPS_A_METRE
-    in_company = np.zeros(len(points), dtype=bool)
-    in_company[inside] = z >= least[key]
-    low = _lowest(points, in_company)
-    is_near = np.hypot(*centres(reach_m=REACH_M, cell_m=CELL_M)) < PLANE_REACH_M
-    return low if np.isfinite(low[is_near]).sum() >= FEWEST_IN_COMPANY else _lowest(points)
+    lowest = packed[: len(packed) - few][packed[few:] - packed[:-few] < 1000 * FLAT_M]
+    cell, first = np.unique(lowest // (2 * _DEEPEST_MM), return_index=True)
+    low = np.full((_CELLS, _CELLS), np.nan)
+    low.ravel()[cell] = (lowest[first] % (2 * _DEEPEST_MM) - _DEEPEST_MM) / 1000.0
+    return low
 
 
 def _without_strays(low: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -200,22 +192,30 @@ def _without_strays(low: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.where(low < beside - STRAY_M, np.nan, low), dtype=np.float64)
 
 
-def _fit_plane(low: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(a, b, c) of z = a x + b y + c, through as many cells' lowest points as can be."""
-    x, y = centres(reach_m=REACH_M, cell_m=CELL_M)
-    near = (np.hypot(x, y) < PLANE_REACH_M) & ~np.isnan(low)
-    if np.count_nonzero(near) < 6:
+def _fit_plane(low: NDArray[np.float64], firm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(a, b, c) of z = a x + b y + c, through as many cells' lowest points (G, G) as can be.
+
+    Which plane, the lowest that have company tell, ``firm`` (G, G), where there are enough.
+    """
+    rows, z = _near_cells(low)
+    if len(z) < 6:
         floor = np.nanmin(low) if not np.isnan(low).all() else 0.0
         return np.array([0.0, 0.0, float(floor)])
-    rows = np.stack([x[near], y[near], np.ones(np.count_nonzero(near))], axis=1)
-    z = low[near]
-    plane = _vote(rows, z)
+    voters = _near_cells(firm)
+    plane = _vote(*voters) if len(voters[1]) >= FEWEST_IN_COMPANY else _vote(rows, z)
     for _ in range(3):
         kept = np.abs(rows @ plane - z) < PLANE_INLIER_M
         if np.count_nonzero(kept) < 6:
             break
         plane = np.asarray(np.linalg.lstsq(rows[kept], z[kept], rcond=None)[0], dtype=np.float64)
     return plane
+
+
+def _near_cells(low: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Rows (K, 3) of x, y and 1 of the known cells near the sensor, and their z (K,), metres."""
+    x, y = centres(reach_m=REACH_M, cell_m=CELL_M)
+    near = (np.hypot(x, y) < PLANE_REACH_M) & ~np.isnan(low)
+    return np.stack([x[near], y[near], np.ones(np.count_nonzero(near))], axis=1), low[near]
 
 
 def _vote(rows: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
