@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from lidaraccum.pipeline.courses import are_alike, turned
+from lidaraccum.pipeline.courses import are_alike
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.objects import TEMPLATE_POINTS, WindowObject
@@ -67,11 +67,9 @@ def _goes_with(
     one: WindowObject, other: WindowObject, frames: Sequence[SightedFrame], settings: MotionSettings
 ) -> bool:
     """Whether another's motion explains a mover's points as well as its own."""
-    own = max(frames, key=lambda frame: len(one.picked.get(frame.index, ())))
+    own = one.fullest(frames)
     template = template_of(own, one.picked[own.index], TEMPLATE_POINTS)
-    velocities = [
-        turned(mover.velocity, mover.turn * (own.stamp - mover.stamp)) for mover in (one, other)
-    ]
+    velocities = [mover.velocity_at(own.stamp) for mover in (one, other)]
     turns = np.array([one.turn, other.turn])
     cost = judge(template, np.stack(velocities), frames, settings, turns).cost
     return bool(cost[1] < cost[0] + NO_WORSE)

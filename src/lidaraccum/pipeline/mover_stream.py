@@ -11,15 +11,14 @@ import numpy as np
 from lidaraccum.data.perceived import PerceivedFrame
 from lidaraccum.pipeline.advice import Advice
 from lidaraccum.pipeline.association import Association
-from lidaraccum.pipeline.courses import are_alike, turned
+from lidaraccum.pipeline.courses import are_alike
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.object_ids import ObjectIds
-from lidaraccum.pipeline.objects import WindowObject
+from lidaraccum.pipeline.objects import WindowObject, saved_by
 from lidaraccum.pipeline.painting import Canvas, paint_mover
 from lidaraccum.pipeline.search import find_objects
 from lidaraccum.pipeline.suspects import spread_out, whole_template
-from lidaraccum.pipeline.verdict import judge
 
 log = logging.getLogger(__name__)
 
@@ -113,10 +112,10 @@ def _is_pose_wrong(
     velocities = [one.velocity for one in found]
     as_one = all(are_alike(velocities[0], other, AS_ONE_MPS, 0.0) for other in velocities[1:])
     most = MOST_MOVING_AS_ONE if len(found) > 1 and as_one else MOST_MOVING
-    moving = sum(map(_size, found))
+    moving = sum(one.size for one in found)
     if moving <= most * sum(len(frame.rows) for frame in window):
         return False
-    large = [one for one in found if _size(one) > MOVER_SHARE * moving]
+    large = [one for one in found if one.size > MOVER_SHARE * moving]
     if large and all(_rest_stands(one, found, window, settings) for one in large):
         return False
     log.warning(
@@ -126,10 +125,6 @@ def _is_pose_wrong(
     return True
 
 
-def _size(one: WindowObject) -> int:
-    return sum(map(len, one.picked.values()))
-
-
 def _rest_stands(
     one: WindowObject,
     found: Sequence[WindowObject],
@@ -137,15 +132,13 @@ def _rest_stands(
     settings: MotionSettings,
 ) -> bool:
     """Whether what seems to stand clearly does not go as one of the movers seems to."""
-    none = np.zeros(0, dtype=np.int64)
-    frame = max(window, key=lambda frame: len(one.picked.get(frame.index, none)))
+    frame = one.fullest(window)
     stands = (frame.met > 0) & (frame.through == 0)
     for mover in found:
-        stands[mover.picked.get(frame.index, none)] = False
+        stands[mover.of(frame)] = False
     spread = spread_out(frame, np.flatnonzero(stands))
     if len(spread) < FEWEST_ASKED:
         return False
     template = whole_template(frame, spread[:: len(spread) // ASKED_POINTS + 1])
-    there = turned(one.velocity, one.turn * (frame.stamp - one.stamp))
-    verdict = judge(template, np.stack([np.zeros(3), there]), window, settings)
-    return bool(verdict.shown[1] < -STANDS_CLEARLY)
+    saved = saved_by(template, one.velocity_at(frame.stamp), 0.0, window, settings)
+    return saved < -STANDS_CLEARLY

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lidaraccum.pipeline.courses import turned
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.gathering import STANDING_MARGIN, gather, without_standing
 from lidaraccum.pipeline.motion_settings import MotionSettings
@@ -61,6 +62,9 @@ FEW_THROUGH = 0.4
 shows over a nearer one goes along, and is seen past."""
 
 
+_NONE = np.zeros(0, dtype=np.int64)
+
+
 @dataclass(frozen=True, eq=False)
 class Expectation:
     """A mover of earlier windows.
@@ -101,6 +105,23 @@ class WindowObject:
     margin: float
     turn: float = 0.0
     unseen: bool = False
+
+    @property
+    def size(self) -> int:
+        """Its obstacles in all frames."""
+        return sum(map(len, self.picked.values()))
+
+    def of(self, frame: SightedFrame) -> NDArray[np.int64]:
+        """Which of a frame's obstacles (K,) are its own."""
+        return self.picked.get(frame.index, _NONE)
+
+    def fullest(self, frames: Sequence[SightedFrame]) -> SightedFrame:
+        """The frame that shows most of it."""
+        return max(frames, key=lambda frame: len(self.of(frame)))
+
+    def velocity_at(self, stamp: float) -> NDArray[np.float64]:
+        """Its velocity (3,), m/s, world, at another time."""
+        return turned(self.velocity, self.turn * (stamp - self.stamp))
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,9 +242,19 @@ def _all_goes_along(
     if len(about) < TEMPLATE_POINTS:
         return False
     template = template_of(own, about, TEMPLATE_POINTS)
+    return saved_by(template, velocity, turn, _probes(frames), settings) > GOES_ALONG
+
+
+def saved_by(
+    template: Template,
+    velocity: NDArray[np.float64],
+    turn: float,
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+) -> float:
+    """How much less points that seem to stand cost if they go so, where nothing is hidden."""
     rivals, turns = np.stack([np.zeros(3), velocity]), np.array([0.0, turn])
-    verdict = judge(template, rivals, _probes(frames), settings, turns)
-    return bool(verdict.shown[1] > GOES_ALONG)
+    return float(judge(template, rivals, frames, settings, turns).shown[1])
 
 
 def _is_promising(cost: float, standing: float, settings: MotionSettings) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.pipeline.advice import Leads, no_leads
-from lidaraccum.pipeline.courses import are_alike, turned, way
+from lidaraccum.pipeline.courses import are_alike, way
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.gathering import WHOLE_GROWTH, with_middle
 from lidaraccum.pipeline.hypotheses import propose
@@ -165,7 +165,7 @@ def _stands_for(
 ) -> bool:
     """Whether a proposed mover is better than those it overlaps: its parts, or something else."""
     if all(_moves_alike(one, rival) for rival in rivals):
-        return _size(one) >= WHOLE_SHARE * sum(map(_size, rivals))
+        return one.size >= WHOLE_SHARE * sum(rival.size for rival in rivals)
     mine, theirs = _savings(one, rivals, frames, settings)
     return mine >= share * theirs
 
@@ -180,8 +180,10 @@ def _savings(
 
     On the points of all of them, in the frame that shows most of both sides.
     """
-    frame = max(frames, key=lambda frame: min(_size_in(frame, [one]), _size_in(frame, rivals)))
-    spread = spread_out(frame, _together([one, *rivals], frame))
+    theirs = {frame.index: sum(len(rival.of(frame)) for rival in rivals) for frame in frames}
+    frame = max(frames, key=lambda frame: min(len(one.of(frame)), theirs[frame.index]))
+    everything = np.unique(np.concatenate([mover.of(frame) for mover in (one, *rivals)]))
+    spread = spread_out(frame, everything)
     asked = spread[:: len(spread) // COMPARED_POINTS + 1]
     template = whole_template(frame, asked)
 
@@ -193,23 +195,13 @@ def _savings(
         moved = standing.copy()
         for mover in movers:
             seconds = frame.stamp - mover.stamp
-            velocity = turned(mover.velocity, mover.turn * seconds)
             centre = mover.centre + way(mover.velocity, mover.turn, seconds)
-            own = np.isin(asked, mover.picked.get(frame.index, _NONE))
-            moved[own] = cost(velocity, mover.turn, centre)[own]
+            own = np.isin(asked, mover.of(frame))
+            moved[own] = cost(mover.velocity_at(frame.stamp), mover.turn, centre)[own]
         return float((standing - moved).mean())
 
     standing = cost(np.zeros(3), 0.0, template.pivot)
     return saved([one]), saved(rivals)
-
-
-def _together(movers: Sequence[WindowObject], frame: SightedFrame) -> NDArray[np.int64]:
-    """A frame's obstacles (K,) that are some mover's."""
-    return np.unique(np.concatenate([one.picked.get(frame.index, _NONE) for one in movers]))
-
-
-def _size_in(frame: SightedFrame, movers: Sequence[WindowObject]) -> int:
-    return sum(len(one.picked.get(frame.index, _NONE)) for one in movers)
 
 
 def _with_accused(
@@ -219,7 +211,7 @@ def _with_accused(
     picked = dict(one.picked)
     for frame in frames:
         for rival in rivals:
-            theirs = rival.picked.get(frame.index, _NONE)
+            theirs = rival.of(frame)
             accused = theirs[frame.through[theirs] > frame.met[theirs]]
             if len(accused):
                 picked[frame.index] = np.union1d(picked.get(frame.index, _NONE), accused)
@@ -228,10 +220,6 @@ def _with_accused(
 
 def _moves_alike(one: WindowObject, other: WindowObject) -> bool:
     return are_alike(one.velocity, other.velocity, ALIKE_MPS, ALIKE_SHARE)
-
-
-def _size(one: WindowObject) -> int:
-    return sum(map(len, one.picked.values()))
 
 
 def _overlap(one: WindowObject, other: WindowObject) -> bool:
@@ -259,8 +247,7 @@ def _explain_lead(
 def _outlined(found: WindowObject, lead: Lead, frames: Sequence[SightedFrame]) -> WindowObject:
     """The mover within its proposer's outline, where that holds most of what moves with it."""
     meant = _meant(found, lead, frames)
-    counts = [sum(map(len, one.picked.values())) for one in (meant, found)]
-    return meant if counts[0] > OUTLINE_SHARE * counts[1] else found
+    return meant if meant.size > OUTLINE_SHARE * found.size else found
 
 
 def _meant(found: WindowObject, lead: Lead, frames: Sequence[SightedFrame]) -> WindowObject:
