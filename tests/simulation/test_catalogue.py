@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import pytest
 
@@ -58,3 +60,18 @@ def test_repainting_changes_paint_alone() -> None:
     paint = car.mesh.surface == Surface.CAR_PAINT
     assert (other.mesh.reflectivity[paint] == np.float32(0.9)).all()
     assert np.array_equal(other.mesh.reflectivity[~paint], car.mesh.reflectivity[~paint])
+
+
+def test_rare_kinds_are_as_much_likelier_as_asked_and_usual_draws_stay() -> None:
+    chances = {"car": 20.0, "pedestrian": 4.0, "truck": 2.0, "bus": 1.0}
+
+    def kinds(**how: float) -> Counter[str]:
+        catalogue = Catalogue(np.random.default_rng(5), **how)
+        return Counter(catalogue.draw_any(chances).category for _ in range(2000))
+
+    usual, often = kinds(), kinds(rare=4.0)
+    assert usual == kinds(rare=1.0)
+    assert usual["Truck"] / usual["Car"] == pytest.approx(0.1, rel=0.25)
+    assert often["Truck"] / often["Car"] == pytest.approx(0.4, rel=0.25)
+    assert often["Bus"] / often["Truck"] == pytest.approx(0.5, rel=0.25)
+    assert often["Pedestrian"] / often["Car"] == pytest.approx(0.2, rel=0.25)

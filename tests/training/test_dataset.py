@@ -126,6 +126,22 @@ def test_sensors_that_are_named_and_no_others_drive_the_same_streets(
         replace(toy.WINDOWS, sensors=("VLP-61",))
 
 
+def test_what_is_rare_is_met_more_often_in_every_other_drive(
+    asked: list[DriveSettings], toy: ModuleType
+) -> None:
+    usual, often = SimulatedDrives(toy.SMALL, toy.WINDOWS), replace(toy.WINDOWS, rare=5.0)
+    for drive in range(4):
+        usual.make(drive)
+        SimulatedDrives(toy.SMALL, often).make(drive)
+    assert [one.rare for one in asked] == [1.0, 1.0, 1.0, 5.0] * 2
+    assert all(
+        replace(here, rare=1.0) == there
+        for there, here in zip(asked[::2], asked[1::2], strict=True)
+    )
+    with pytest.raises(SettingsError, match="rare"):
+        replace(toy.WINDOWS, rare=0.0)
+
+
 @pytest.mark.parametrize(("seed", "drive"), [(190, 0), (0, 10_000_000)])
 def test_drives_beyond_the_training_seeds_are_refused(
     asked: list[DriveSettings], toy: ModuleType, seed: int, drive: int

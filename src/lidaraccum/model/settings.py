@@ -54,7 +54,7 @@ class NetworkSettings:
     pillar_points: int = 16
     point_hidden: int = 32
     pillar_channels: int = 48
-    base_widths: tuple[int, ...] = (32, 64, 128, 192)
+    base_widths: tuple[int, ...] = (32, 64, 128, 192, 256)
     ego_channels: int = 64
     ego_pillars: int = 1024
     slack_start: float = -1.0
@@ -65,7 +65,7 @@ class NetworkSettings:
     temporal_channels: int = 48
     temporal_blocks: int = 2
     temporal: str = "max"
-    motion_widths: tuple[int, ...] = (64, 96, 128)
+    motion_widths: tuple[int, ...] = (64, 96, 128, 160)
     point_channels: int = 128
     tube_channels: int = 128
 

@@ -72,6 +72,13 @@ class _Up(nn.Module):
         wide = nn.functional.interpolate(self.narrow(coarse), scale_factor=2.0, mode="nearest")
         return self.refine(torch.relu_(wide.add_(skipped)))
 
+    def hand_through(self) -> None:
+        """Make it hand on what it is given at its own level, and nothing of the coarser one."""
+        for layer in (self.narrow, self.refine):
+            nn.init.zeros_(layer.weight)
+            nn.init.zeros_(cast("torch.Tensor", layer.bias))
+        nn.init.dirac_(self.refine.weight)
+
 
 class UNet(nn.Module):
     """Maps (N, C, H, W) to (N, widths[0], H, W); H and W are multiples of 2^(levels - 1).
@@ -105,3 +112,17 @@ class UNet(nn.Module):
             level = up(level, skipped.pop())
         cells: torch.Tensor = self.normalise(level.permute(0, 2, 3, 1))
         return cells.to(level.dtype).permute(0, 3, 1, 2)
+
+    def go_on_from(self, before: UNet) -> None:
+        """Take over what a U-Net of fewer levels has learned; those below say nothing yet."""
+        added = len(self.downs) - len(before.downs)
+        pairs = [
+            (self.stem, before.stem),
+            (self.normalise, before.normalise),
+            *zip(self.downs, before.downs, strict=False),
+            *zip(list(self.ups)[added:], before.ups, strict=True),
+        ]
+        for new, old in pairs:
+            new.load_state_dict(old.state_dict())
+        for up in list(self.ups)[:added]:
+            cast("_Up", up).hand_through()

@@ -30,6 +30,9 @@ MAKERS: dict[str, Maker] = {
 }  # fmt: skip
 """Movable shapes by name."""
 
+COMMON = ("car", "pedestrian")
+"""What streets are full of; all other kinds are rare."""
+
 POOL = {"car": 9, "van": 3, "pedestrian": 5, "cyclist": 3, "bicycle": 3}
 DEFAULT_POOL = 2
 
@@ -39,15 +42,17 @@ class Catalogue:
 
     Args:
         rng: What is drawn comes from here.
+        rare: All kinds but the common ones are so many times as likely as is usual.
     """
 
-    def __init__(self, rng: np.random.Generator) -> None:
+    def __init__(self, rng: np.random.Generator, rare: float = 1.0) -> None:
         self._rng = rng
+        self._rare = rare
         self._pools: dict[str, list[Model]] = {}
 
     def drawing_from(self, rng: np.random.Generator) -> Catalogue:
         """The shapes so far in a catalogue that draws from another generator; this one stays."""
-        other = Catalogue(rng)
+        other = Catalogue(rng, self._rare)
         other._pools = {name: list(pool) for name, pool in self._pools.items()}
         return other
 
@@ -63,5 +68,7 @@ class Catalogue:
 
     def draw_any(self, chances: Mapping[str, float]) -> Model:
         """A model of a kind drawn by its chance."""
-        weights = np.array(list(chances.values()))
+        weights = np.array(
+            [chance * (1.0 if kind in COMMON else self._rare) for kind, chance in chances.items()]
+        )
         return self.draw(str(self._rng.choice(list(chances), p=weights / weights.sum())))

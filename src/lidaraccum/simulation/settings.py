@@ -35,6 +35,8 @@ class DriveSettings:
         coordinates: ``sensor``, or ``vehicle``: on the ground under the car.
         weather: clear, rain, fog or snow.
         zeros: Whether pulses that never came back are delivered as points at 0, 0, 0.
+        rare: Lorries, buses, vans, trailers, things on two wheels, oddities (all that is movable
+            but cars and people on foot) are so many times as likely as usual where one is drawn.
         exact: Without noise, losses, mixed edges or weather; for tests of laws.
     """
 
@@ -50,6 +52,7 @@ class DriveSettings:
     coordinates: Literal["sensor", "vehicle"] | None = None
     weather: str | None = None
     zeros: bool | None = None
+    rare: float = 1.0
     exact: bool = False
 
     def __post_init__(self) -> None:
@@ -61,6 +64,8 @@ class DriveSettings:
             raise SettingsError(f"a sensor turns 1 to 50 times a second, not {self.rate_hz}")
         if self.speed_mps is not None and not 0.0 <= self.speed_mps <= 45.0:
             raise SettingsError(f"the ego drives 0 to 45 m/s, not {self.speed_mps}")
+        if self.rare <= 0.0:
+            raise SettingsError(f"rare is a factor above 0, not {self.rare}")
         for word, value, known in (
             ("sensor", self.sensor, (*SENSORS, RANDOM_SENSOR)),
             ("scene", self.scene, SCENE_KINDS),

@@ -45,18 +45,21 @@ class World:
     catalogue: Catalogue
 
 
-def build_world(network: Network, reach_m: float, rng: np.random.Generator) -> World:
+def build_world(
+    network: Network, reach_m: float, rng: np.random.Generator, rare: float = 1.0
+) -> World:
     """The world about the ego's way.
 
     Args:
         network: Its roads.
         reach_m: How far the ego will drive, metres.
         rng: What is drawn comes from here.
+        rare: How many times as likely as usual rare movable kinds are.
     """
     growing = rng.spawn(1)[0]
     along = network.ego_start + np.linspace(0, max(reach_m, 1.0), 12)
     terrain = shape_terrain(network, network.ego.at(along)[0], rng)
-    plot, catalogue = Plot(network, terrain, rng), Catalogue(rng)
+    plot, catalogue = Plot(network, terrain, rng), Catalogue(rng, rare)
     build_overhead(plot, network.kind, network.ego_start)
     site = Site(plot, catalogue)
     _fill_squares(plot, site)

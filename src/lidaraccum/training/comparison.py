@@ -170,8 +170,9 @@ class _Run:
             return None
         network, windows = fresh_network(settings).settings, settings.windows
         make = SimulatedDrives(network, windows, DRIVES_SEED).make
+        rare = [f"rare{windows.rare:g}"] if windows.rare != 1.0 else []
         kind = "-".join(
-            [f"{windows.extent_m:g}m", f"{windows.drive_frames}frames", *windows.sensors]
+            [f"{windows.extent_m:g}m", f"{windows.drive_frames}frames", *rare, *windows.sensors]
         )
         folder = shared / kind
         folder.mkdir(parents=True, exist_ok=True)

@@ -32,6 +32,8 @@ class WindowSettings:
         drive_frames: Frames of a simulated drive.
         sensors: Sensors of simulated drives by name, each as likely as the others; all there are,
             and made-up ones, when empty.
+        rare: In every other simulated drive what is movable but no car nor on foot is so many times
+            as likely as usual: a lorry that is met once in a hundred windows is not learned.
         augment: How windows are changed.
     """
 
@@ -42,6 +44,7 @@ class WindowSettings:
     windows_per_drive: int = 4
     drive_frames: int = 10
     sensors: tuple[str, ...] = ()
+    rare: float = 1.0
     augment: AugmentSettings = field(default_factory=AugmentSettings)
 
     def __post_init__(self) -> None:
@@ -53,6 +56,7 @@ class WindowSettings:
             raise SettingsError("a drive has at least as many frames as its longest window")
         if self.windows_per_drive < 1 or self.largest_step < 1:
             raise SettingsError("windows_per_drive and largest_step are at least 1")
+        DriveSettings(rare=self.rare)  # refuses what it cannot be
         for name in self.sensors:
             DriveSettings(sensor=name)  # refuses what no sensor is called
 

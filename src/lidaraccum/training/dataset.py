@@ -67,6 +67,8 @@ class SimulatedDrives:
         if not 0 <= drive < _DRIVES_OF_A_SEED or number >= FIRST_VALIDATION_SEED:
             raise SettingsError(f"there is no drive {drive} of seed {self.seed}")
         drawn = replace(training_settings(number, self.settings.drive_frames), compensated=True)
+        if drive % 2:
+            drawn = replace(drawn, rare=self.settings.rare)
         if self.settings.sensors:
             rng = np.random.default_rng([self.seed, drive, 5])
             drawn = replace(drawn, sensor=str(rng.choice(self.settings.sensors)))

@@ -51,7 +51,8 @@ class TrainSettings:
     """A run: what is learned, from what, for how long. The same settings, the same weights.
 
     Attributes:
-        network: The network's; of it only `model.settings.EFFORT` when ``start_from`` is given.
+        network: The network's; when ``start_from`` is given, of it only `model.settings.EFFORT` and
+            levels below those of the weights (see `model.deepen`).
         windows: How windows are cut and changed.
         objective: What the loss is made of.
         optimiser: Adam and its schedule.

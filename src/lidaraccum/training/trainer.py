@@ -14,6 +14,7 @@ import torch
 
 from lidaraccum.errors import OutputExistsError, SettingsError
 from lidaraccum.model.checkpoint import load_network
+from lidaraccum.model.deepen import deepened
 from lidaraccum.model.network import Network, build_network
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.training.crew import Crew
@@ -226,7 +227,8 @@ def fresh_network(settings: TrainSettings) -> Network:
     """What a run begins with: weights drawn by its seed, or those it goes on from."""
     if settings.start_from is None:
         return build_network(settings.network, settings.seed)
-    return load_network(settings.start_from, settings.network)
+    begun = load_network(settings.start_from, settings.network)
+    return deepened(begun, settings.network, settings.seed)
 
 
 def _fresh_state(settings: TrainSettings, device: torch.device) -> RunState:
