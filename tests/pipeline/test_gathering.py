@@ -7,7 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from lidaraccum.pipeline.gathering import length_along, seconds_at_place, without_strays
+from lidaraccum.pipeline.courses import turned, way
+from lidaraccum.pipeline.gathering import (
+    length_along,
+    seconds_at_place,
+    without_flanks,
+    without_strays,
+)
 
 
 @dataclass(frozen=True)
@@ -15,6 +21,69 @@ class Dots:
     """As much of a frame as is asked for."""
 
     points: np.ndarray
+
+
+@dataclass(frozen=True)
+class Passing:
+    """A frame of things that pass, and how often their points were met and seen through."""
+
+    index: int
+    stamp: float
+    points: np.ndarray
+    through: np.ndarray
+    met: np.ndarray
+
+    def world(self, picked: np.ndarray) -> np.ndarray:
+        return self.points[picked]
+
+
+VELOCITY = np.array([6.0, 2.0, 0.0])
+
+
+def passing(turn: float, widths: tuple[float, float], shares: tuple[float, float]) -> list[Passing]:
+    """400 points up to the first width either side of a course, and 300 beyond the second.
+
+    Shares of each were seen through.
+    """
+    rng = np.random.default_rng(1)
+    frames = []
+    for index in range(4):
+        stamp = 0.1 * index
+        ahead = turned(VELOCITY, turn * stamp)
+        ahead /= np.linalg.norm(ahead)
+        left = np.array([-ahead[1], ahead[0], 0.0])
+        body = rng.uniform(-widths[0], widths[0], 400)
+        beyond = rng.uniform(widths[1], widths[1] + 3.0, 300)
+        aside = np.concatenate([body, beyond])[:, None]
+        along = rng.uniform(-5, 5, (700, 1))
+        through = np.concatenate([rng.random(400) < shares[0], rng.random(300) < shares[1]])
+        points = way(VELOCITY, turn, stamp) + along * ahead + aside * left
+        frames.append(Passing(index, stamp, points, through.astype(int), (~through).astype(int)))
+    return frames
+
+
+def left_of(frames: list[Passing], turn: float) -> list[list[int]]:
+    picked = {frame.index: np.arange(len(frame.points)) for frame in frames[:3]}
+    there = VELOCITY, frames, np.zeros(3), 0.0, turn
+    kept = without_flanks(picked, *there)  # type: ignore[arg-type]
+    assert sorted(kept) == [0, 1, 2]
+    return [mine.tolist() for mine in kept.values()]
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.6])
+def test_a_hedge_beside_a_bus_does_not_go_along(turn: float) -> None:
+    kept = left_of(passing(turn, (1.25, 4.0), (0.3, 0.08)), turn)
+    assert kept == [list(range(400))] * 3
+
+
+def test_people_side_by_side_all_of_whom_walk_stay_together() -> None:
+    kept = left_of(passing(0.0, (1.25, 4.0), (0.5, 0.4)), 0.0)
+    assert kept == [list(range(700))] * 3
+
+
+def test_a_vehicle_keeps_its_unaccused_side() -> None:
+    kept = left_of(passing(0.0, (0.4, 0.4), (0.5, 0.0)), 0.0)
+    assert kept == [list(range(700))] * 3
 
 
 def test_few_points_far_from_the_others_are_not_a_movers() -> None:

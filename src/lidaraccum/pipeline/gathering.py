@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from lidaraccum.geometry.clustering import connected_cells
 from lidaraccum.geometry.voxel import thin
-from lidaraccum.pipeline.courses import turned
+from lidaraccum.pipeline.courses import turned, way
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.landing import Lineup
 from lidaraccum.pipeline.motion_settings import MotionSettings
@@ -29,7 +29,7 @@ MOST_GROWTH = 8.0
 """What has so many times the points at one distance is something else: a wall that was touched."""
 
 BOX_MARGIN_M = 0.3
-"""So far outside a mover's box nothing is its own."""
+"""So far outside a mover's box, or its strip, nothing is its own."""
 
 STANDING_SHARE = 0.1
 STANDING_MARGIN = 0.1
@@ -40,6 +40,13 @@ PASSING_M = 0.3
 OUTLASTING_SHARE = 0.5
 """A mover is at a place while it goes its length and this much more. What was there for longer
 stands beside it; but where more than this share of it would, its length or speed is wrong."""
+
+WIDEST_M = 4.0
+FLANK_SHARE = 0.5
+AS_ACCUSED = 0.98
+"""No vehicle is wider, across its way. What lies beside the strip of this width that was seen
+through most, up to the last share, and was seen through less than the second share as often, is
+something else: a hedge that the mover passes."""
 
 STRAY_SHARE = 0.02
 STRAY_GAP_M = 1.0
@@ -173,6 +180,66 @@ def without_standing(
         if len(mine):
             kept[frame.index] = mine
     return kept
+
+
+def without_flanks(
+    picked: Mapping[int, NDArray[np.int64]],
+    velocity: NDArray[np.float64],
+    frames: Sequence[SightedFrame],
+    centre: NDArray[np.float64],
+    stamp: float,
+    turn: float,
+) -> dict[int, NDArray[np.int64]]:
+    """A mover's points less what is too far aside to be a vehicle's and seldom seen through.
+
+    What grows beside a road has a partner wherever it goes: its costs do not tell.
+
+    Args:
+        picked: By frame index: its obstacles (K,).
+        velocity: (3,) m/s, world, at ``stamp``.
+        frames: The window.
+        centre: (3,) metres, world, of some of its points at ``stamp``.
+        stamp: Seconds.
+        turn: Radians a second.
+    """
+    shown = [frame for frame in frames if len(picked.get(frame.index, ()))]
+    aside, accused = [], []
+    for frame in shown:
+        mine, seconds = picked[frame.index], frame.stamp - stamp
+        ahead = turned(velocity, turn * seconds)[:2]
+        left = np.array([-ahead[1], ahead[0]]) / np.linalg.norm(ahead)
+        here = centre[:2] + way(velocity, turn, seconds)[:2]
+        aside.append((frame.world(mine)[:, :2] - here) @ left)
+        accused.append(frame.through[mine] > frame.met[mine])
+    if not shown:
+        return dict(picked)
+    stays = ~_is_flank(np.concatenate(aside), np.concatenate(accused))
+    parts = np.split(stays, np.cumsum([len(one) for one in aside])[:-1])
+    kept = {
+        frame.index: picked[frame.index][part] for frame, part in zip(shown, parts, strict=True)
+    }
+    return {index: mine for index, mine in kept.items() if len(mine)}
+
+
+def _is_flank(aside: NDArray[np.float64], accused: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which of points so far aside (N,), metres, lie beside the strip that is accused most."""
+    none = np.zeros(len(aside), dtype=np.bool_)
+    if np.ptp(aside) <= WIDEST_M or not accused.any():
+        return none
+    everywhere, there = np.sort(aside), np.sort(aside[accused])
+    starts = np.unique(np.concatenate([there, there - WIDEST_M]))
+    held = [
+        np.searchsorted(places, starts + WIDEST_M, side="right") - np.searchsorted(places, starts)
+        for places in (there, everywhere)
+    ]
+    enough = held[0] >= AS_ACCUSED * held[0].max()
+    start = starts[enough][held[1][enough].argmin()]
+    inside = (aside >= start) & (aside <= start + WIDEST_M)
+    flank = none
+    for side in (aside < start - BOX_MARGIN_M, aside > start + WIDEST_M + BOX_MARGIN_M):
+        if side.any() and accused[side].mean() < FLANK_SHARE * accused[inside].mean():
+            flank = flank | side
+    return flank
 
 
 def length_along(points: NDArray[np.float64], velocity: NDArray[np.float64]) -> float:

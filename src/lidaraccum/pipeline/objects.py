@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 
 from lidaraccum.pipeline.courses import turned
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.gathering import STANDING_MARGIN, gather, without_standing
+from lidaraccum.pipeline.gathering import (
+    STANDING_MARGIN,
+    gather,
+    without_flanks,
+    without_standing,
+)
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.suspects import (
     Suspect,
@@ -213,8 +218,9 @@ def explain(
     picked = gather(suspect, velocity, frames, settings, turn)
     # Where nobody saw through, what it touches and what moves as well as it stands, stands.
     margin = -STANDING_MARGIN if unseen and settings.min_through >= 0 else STANDING_MARGIN
+    picked = without_standing(picked, velocity, frames, settings, own.stamp, turn, margin)
     return WindowObject(
-        picked=without_standing(picked, velocity, frames, settings, own.stamp, turn, margin),
+        picked=without_flanks(picked, velocity, frames, suspect.centre, own.stamp, turn),
         velocity=velocity,
         centre=suspect.centre,
         stamp=own.stamp,
