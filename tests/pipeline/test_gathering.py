@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -79,6 +79,25 @@ def test_a_hedge_beside_a_bus_does_not_go_along(turn: float) -> None:
 def test_people_side_by_side_all_of_whom_walk_stay_together() -> None:
     kept = left_of(passing(0.0, (1.25, 4.0), (0.5, 0.4)), 0.0)
     assert kept == [list(range(700))] * 3
+
+
+def test_a_lorry_askew_in_a_bend_stays_whole_and_a_fence_across_does_not() -> None:
+    """The way is told straight on. Of both, one half was seen through."""
+    lorry, fence = (
+        [_seen_halfway(frame, np.deg2rad(degrees)) for frame in passing(0.0, (1, -1), (0, 0))]
+        for degrees in (25.0, 90.0)
+    )
+    assert left_of(lorry, 0.0) == [list(range(700))] * 3
+    assert all(len(mine) < 500 for mine in left_of(fence, 0.0))
+
+
+def _seen_halfway(frame: Passing, angle: float) -> Passing:
+    """The frame's things turned on their place, of which the further end was seen through."""
+    local = frame.points - way(VELOCITY, 0.0, frame.stamp)
+    through = (local @ VELOCITY > 0).astype(int)
+    there = np.array([turned(one, angle) for one in local])
+    points = there + way(VELOCITY, 0.0, frame.stamp)
+    return replace(frame, points=points, through=through, met=1 - through)
 
 
 def test_a_vehicle_keeps_its_unaccused_side() -> None:

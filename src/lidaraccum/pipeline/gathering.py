@@ -44,9 +44,14 @@ stands beside it; but where more than this share of it would, its length or spee
 WIDEST_M = 4.0
 FLANK_SHARE = 0.5
 AS_ACCUSED = 0.98
-"""No vehicle is wider, across its way. What lies beside the strip of this width that was seen
-through most, up to the last share, and was seen through less than the second share as often, is
-something else: a hedge that the mover passes."""
+"""No vehicle is wider. Of what is, and lies beside the strip of this width along its way that was
+seen through most, up to the last share, that is something else which was seen through less than
+the second share as often: a hedge that the mover passes."""
+
+SKEW_RAD = np.deg2rad(np.arange(-35, 36, 5))
+ENDS = (0.01, 0.99)
+"""A vehicle in a bend lies askew to its way, by one of these. Its width lies between these
+quantiles of its points."""
 
 STRAY_SHARE = 0.02
 STRAY_GAP_M = 1.0
@@ -203,34 +208,34 @@ def without_flanks(
         turn: Radians a second.
     """
     shown = [frame for frame in frames if len(picked.get(frame.index, ()))]
-    aside, accused = [], []
-    for frame in shown:
-        mine, seconds = picked[frame.index], frame.stamp - stamp
-        ahead = turned(velocity, turn * seconds)[:2]
-        left = np.array([-ahead[1], ahead[0]]) / np.linalg.norm(ahead)
-        here = centre[:2] + way(velocity, turn, seconds)[:2]
-        aside.append((frame.world(mine)[:, :2] - here) @ left)
-        accused.append(frame.through[mine] > frame.met[mine])
     if not shown:
         return dict(picked)
-    stays = ~_is_flank(np.concatenate(aside), np.concatenate(accused))
-    parts = np.split(stays, np.cumsum([len(one) for one in aside])[:-1])
+    places, accused = [], []
+    for frame in shown:
+        mine, seconds = picked[frame.index], frame.stamp - stamp
+        ahead = turned(velocity, turn * seconds)[:2] / np.linalg.norm(velocity[:2])
+        axes = np.array([ahead, [-ahead[1], ahead[0]]]).T
+        here = centre[:2] + way(velocity, turn, seconds)[:2]
+        places.append((frame.world(mine)[:, :2] - here) @ axes)
+        accused.append(frame.through[mine] > frame.met[mine])
+    stays = ~_is_flank(np.concatenate(places), np.concatenate(accused))
+    parts = np.split(stays, np.cumsum([len(one) for one in places])[:-1])
     kept = {
         frame.index: picked[frame.index][part] for frame, part in zip(shown, parts, strict=True)
     }
     return {index: mine for index, mine in kept.items() if len(mine)}
 
 
-def _is_flank(aside: NDArray[np.float64], accused: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which of points so far aside (N,), metres, lie beside the strip that is accused most."""
-    none = np.zeros(len(aside), dtype=np.bool_)
-    if np.ptp(aside) <= WIDEST_M or not accused.any():
+def _is_flank(places: NDArray[np.float64], accused: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which of points at places (N, 2), metres along and aside, are beside what is accused most."""
+    none, aside = np.zeros(len(places), dtype=np.bool_), places[:, 1]
+    if np.ptp(aside) <= WIDEST_M or not accused.any() or _width(places) <= WIDEST_M:
         return none
     everywhere, there = np.sort(aside), np.sort(aside[accused])
     starts = np.unique(np.concatenate([there, there - WIDEST_M]))
     held = [
-        np.searchsorted(places, starts + WIDEST_M, side="right") - np.searchsorted(places, starts)
-        for places in (there, everywhere)
+        np.searchsorted(some, starts + WIDEST_M, side="right") - np.searchsorted(some, starts)
+        for some in (there, everywhere)
     ]
     enough = held[0] >= AS_ACCUSED * held[0].max()
     start = starts[enough][held[1][enough].argmin()]
@@ -240,6 +245,13 @@ def _is_flank(aside: NDArray[np.float64], accused: NDArray[np.bool_]) -> NDArray
         if side.any() and accused[side].mean() < FLANK_SHARE * accused[inside].mean():
             flank = flank | side
     return flank
+
+
+def _width(places: NDArray[np.float64]) -> float:
+    """How wide, metres, points at places (N, 2) are across, however askew they may lie."""
+    across = places @ np.stack([np.sin(SKEW_RAD), np.cos(SKEW_RAD)])
+    low, high = np.quantile(across, ENDS, axis=0)
+    return float((high - low).min())
 
 
 def length_along(points: NDArray[np.float64], velocity: NDArray[np.float64]) -> float:
