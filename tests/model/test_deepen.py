@@ -33,8 +33,10 @@ def test_more_levels_change_nothing_until_they_learn(
         motion_widths=(*own.motion_widths, 56, 64)[: 2 + added],
         point_channels=16,  # is the weights' own
     )
-    grown = deepened(network, asked, seed=0).eval()
+    grown = deepened(network, asked).eval()
     assert grown.settings == replace(asked, point_channels=own.point_channels)
+    again = deepened(network, asked).state_dict()
+    assert all(torch.equal(values, again[name]) for name, values in grown.state_dict().items())
     before, after = answers(network, frames), answers(grown, frames)
     assert len(before[1]) > 100
     for old, new in zip(before, after, strict=True):
@@ -45,7 +47,7 @@ def test_the_levels_added_learn_from_the_second_step_on(
     network: Network, frames: list[Frame]
 ) -> None:
     own = network.settings
-    grown = deepened(network, replace(own, base_widths=(*own.base_widths, 40)), seed=0)
+    grown = deepened(network, replace(own, base_widths=(*own.base_widths, 40)))
     seen = to_tensors([prepare(frame, own) for frame in frames[:1]])
     optimiser = torch.optim.SGD(grown.parameters(), lr=1e-3)
     deepest = grown.backbone.downs[-1].refine.weight
@@ -58,8 +60,8 @@ def test_the_levels_added_learn_from_the_second_step_on(
 
 def test_weights_of_as_many_levels_or_of_others_stay_as_they_are(network: Network) -> None:
     own = network.settings
-    assert deepened(network, own, 0) is network
+    assert deepened(network, own) is network
     fewer = replace(own, base_widths=own.base_widths[:2])
-    assert deepened(network, fewer, 0) is network
+    assert deepened(network, fewer) is network
     wider = replace(own, base_widths=(24, 32, 40, 48))
-    assert deepened(network, wider, 0) is network
+    assert deepened(network, wider) is network

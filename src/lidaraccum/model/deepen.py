@@ -14,15 +14,15 @@ from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.model.unet import channels_last
 
 
-def deepened(network: Network, settings: NetworkSettings, seed: int) -> Network:
+def deepened(network: Network, settings: NetworkSettings) -> Network:
     """A network with as many levels as the settings ask for, which says what this one says.
 
     Args:
         network: Trained. It is returned as it is where the settings ask for no more levels, or for
             others.
         settings: Whose ``base_widths`` and ``motion_widths`` to reach, where they begin with the
-            network's own.
-        seed: Of the new levels' weights.
+            network's own. The new levels begin alike, whoever asks: runs that go on from the same
+            weights may be averaged.
     """
     own = network.settings
     deeper = replace(
@@ -32,7 +32,7 @@ def deepened(network: Network, settings: NetworkSettings, seed: int) -> Network:
     )
     if deeper == own:
         return network
-    grown = build_network(deeper, seed)
+    grown = build_network(deeper)
     with torch.no_grad():
         grown.backbone.go_on_from(network.backbone)
         grown.motion_map.unet.go_on_from(network.motion_map.unet)

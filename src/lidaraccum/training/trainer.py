@@ -227,8 +227,7 @@ def fresh_network(settings: TrainSettings) -> Network:
     """What a run begins with: weights drawn by its seed, or those it goes on from."""
     if settings.start_from is None:
         return build_network(settings.network, settings.seed)
-    begun = load_network(settings.start_from, settings.network)
-    return deepened(begun, settings.network, settings.seed)
+    return deepened(load_network(settings.start_from, settings.network), settings.network)
 
 
 def _fresh_state(settings: TrainSettings, device: torch.device) -> RunState:
