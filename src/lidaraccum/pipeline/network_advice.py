@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lidaraccum.geometry import rigid
 from lidaraccum.geometry.clustering import dense_groups
 from lidaraccum.model.reading import FrameReading
 from lidaraccum.pipeline.advice import Leads
@@ -29,7 +30,8 @@ MOVABLE_ABOVE = 0.5
 """Points whose probability of being on something movable is higher are."""
 
 STILL_POINTS = 10
-"""What stands has so many points in a frame, low ones among them."""
+"""What stands has so many points in a frame, low ones among them, that are not so close that they
+may be the carrier's. Those which are join the others: the carrier has none but them."""
 
 
 class NetworkAdvice:
@@ -118,7 +120,8 @@ class NetworkAdvice:
         free = (movable > MOVABLE_ABOVE) & (canvas.instances(rows) == 0)
         rows, level, movable = rows[free], level[free], movable[free]
         cluster = dense_groups(level + reading.offset[rows], CELL_M, RADIUS_M, NEIGHBOURS)
-        counts = np.bincount(cluster[cluster >= 0], minlength=1)
+        told = (cluster >= 0) & ~np.isin(rows, frame.close_rows)
+        counts = np.bincount(cluster[told], minlength=int(cluster.max(initial=0)) + 1)
         groups = [np.flatnonzero(cluster == one) for one in np.flatnonzero(counts >= STILL_POINTS)]
         names = self._still.name([level[group] for group in groups])
         for name, group in zip(names, groups, strict=True):
@@ -152,6 +155,7 @@ class NetworkAdvice:
 
 
 def _standing(frame: SightedFrame) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Rows (K,) of what stands on the ground, near enough to be looked at, and places (K, 2)."""
-    rows = np.concatenate([frame.rows, frame.low_rows])
-    return rows, frame.near_world[:, :2]
+    """Rows (K,) of what stands on the ground, the carrier perhaps among it, and places (K, 2)."""
+    rows = np.concatenate([frame.rows, frame.low_rows, frame.close_rows])
+    close = rigid.transform(frame.world_from_sensor, frame.close_points)
+    return rows, np.concatenate([frame.near_world, close])[:, :2]
