@@ -14,7 +14,7 @@ from lidaraccum.model.batch import prepare, to_tensors
 from lidaraccum.model.bytes import in_bytes
 from lidaraccum.model.checkpoint import load_network
 from lidaraccum.model.motion import Windows
-from lidaraccum.model.network import presence_map, some_close_points
+from lidaraccum.model.network import MOST_POINTS, presence_map
 from lidaraccum.model.precision import has_bfloat16, inference
 from lidaraccum.model.reader import NetworkReader
 from lidaraccum.model.weights import chosen_weights
@@ -56,9 +56,9 @@ def main() -> None:
                 features.maps, presence_map(features), poses, windows, tensors.stamps, 32.0
             ),
         )
-        points = some_close_points(features)
-        seen = timed("perceive", lambda: network.perceive(features, poses, windows, points))
-        ids = torch.arange(len(points)) % 30
+        most = {"most": MOST_POINTS}
+        seen = timed("perceive", lambda: network.perceive(features, poses, windows, **most))
+        ids = torch.arange(len(seen.point)) % 30
         timed("track (29 objects)", lambda: network.track(seen, ids))
     reader, still = NetworkReader(network), np.tile(np.eye(4), (5, 1, 1))
     encoded = [reader.read(frame) for frame in frames]

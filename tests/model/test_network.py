@@ -31,9 +31,9 @@ def by_row(features: FrameFeatures, seen: Perception, frame: int) -> dict[int, l
     return dict(zip(rows, said.tolist(), strict=True))
 
 
-def test_about_two_million_weights() -> None:
+def test_about_four_million_weights() -> None:
     count = sum(parameter.numel() for parameter in build_network().parameters())
-    assert 1.5e6 < count < 2.5e6
+    assert 3.5e6 < count < 4.5e6
 
 
 def test_where_the_affinity_starts_changes_no_other_fresh_weight(network: Network) -> None:
@@ -179,6 +179,34 @@ def test_poses_are_in_sensor_coordinates(network: Network, frames: list[Frame]) 
     mount = torch.from_numpy(tilt).float()
     back = torch.linalg.inv(mount) @ level[1].target_from_source[0] @ mount
     torch.testing.assert_close(back, level[0].target_from_source[0], atol=0.25, rtol=0)
+
+
+def test_points_that_are_not_read_are_answered_by_their_pillars(
+    network: Network, frames: list[Frame]
+) -> None:
+    features = encode(network, frames[:3], 16.0)
+    whole = network.perceive(features, still(3), Windows.single(3))
+    count = len(whole.point)
+    some = network.perceive(features, still(3), Windows.single(3), most=count // 3 + 1)
+    assert torch.equal(some.point, whole.point)
+    read = torch.unique(some.speaker, return_inverse=True)[1]
+    assert len(some.base) == int(read.max()) + 1 < 0.8 * count
+    spoken = torch.searchsorted(some.speaker, torch.arange(len(some.base)))
+    pillar = features.frames.pillar[some.point]
+    assert torch.equal(pillar[spoken][some.speaker], pillar)
+    for name in ("foreground", "dynamic", "offset"):
+        mine, told = getattr(some, name), getattr(whole, name)
+        torch.testing.assert_close(mine[spoken], told[spoken], atol=1e-5, rtol=1e-4)
+    assert torch.equal(some.dynamic, some.dynamic[spoken][some.speaker])
+    centre = some.position[:, :2] + some.offset
+    torch.testing.assert_close(centre, centre[spoken][some.speaker], atol=1e-5, rtol=1e-4)
+    chosen = torch.arange(count) % 5 == 0
+    told = whole.features_of(torch.isin(torch.arange(count), spoken))
+    torch.testing.assert_close(
+        some.features_of(chosen), told[some.speaker[chosen]], atol=1e-5, rtol=1e-4
+    )
+    ids = torch.where(some.position[:, 0] > 0, 7, 0)
+    assert network.track(some, ids).ids.tolist() == [7]
 
 
 def test_fresh_tracks_stand_still(network: Network, frames: list[Frame]) -> None:

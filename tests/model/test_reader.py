@@ -48,6 +48,19 @@ def test_probabilities_for_the_points_on_the_grid_background_for_the_rest(
         assert not said.offset[outside].any()
 
 
+def test_a_sensor_of_many_points_is_answered_point_by_point(
+    reader: NetworkReader, frames: list[Frame], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the network has no time to read is no background."""
+    whole = look(reader, frames[:3], poses(3))
+    monkeypatch.setattr("lidaraccum.model.reader.MOST_POINTS", 4000)
+    some = look(reader, frames[:3], poses(3))
+    for every, few in zip(whole.frames, some.frames, strict=True):
+        assert np.count_nonzero(every.foreground) > 2000
+        np.testing.assert_array_equal(few.foreground > 0, every.foreground > 0)
+        assert np.abs(few.foreground - every.foreground).mean() < 0.05
+
+
 def test_answers_lie_in_the_frame_s_own_rows(reader: NetworkReader, frames: list[Frame]) -> None:
     rng = np.random.default_rng(2)
     orders = [rng.permutation(len(frame)) for frame in frames[:2]]

@@ -12,7 +12,7 @@ import torch
 from lidaraccum.model.batch import FrameTensors, to_arrays
 from lidaraccum.model.kabsch import chain, invert, move
 from lidaraccum.model.motion import Windows
-from lidaraccum.model.network import FrameFeatures, ObjectMotions, Perception
+from lidaraccum.model.network import FrameFeatures, ObjectMotions, Perception, close_points
 from lidaraccum.model.tube import gather_tubes
 from lidaraccum.training.alone import cluster_by_offsets
 from lidaraccum.training.end_to_end import goal_of
@@ -66,8 +66,15 @@ class Oracle:
         return SimpleNamespace(target_from_source=poses)
 
     def perceive(
-        self, features: FrameFeatures, poses: torch.Tensor, windows: Windows, points: torch.Tensor
+        self,
+        features: FrameFeatures,
+        poses: torch.Tensor,
+        windows: Windows,
+        points: torch.Tensor | None = None,
+        *,
+        most: int = 0,
     ) -> Perception:
+        points = close_points(features) if points is None else points
         frames, truth = features.frames, self.batch.truth
         frame = frames.point_frame[points]
         target = windows.target[0]
@@ -78,8 +85,8 @@ class Oracle:
         seen = Perception(
             windows, points, frame, position, sign[0][points],
             sign[1][points] if self.sees_motion else torch.full((len(points),), -10.0),
-            torch.zeros(len(points), 2), nothing, nothing,
-            torch.tensor(windows.gaps(frames.stamps)).float()[frame],
+            torch.zeros(len(points), 2), torch.tensor(windows.gaps(frames.stamps)).float()[frame],
+            torch.arange(len(points)), nothing, nothing,
         )  # fmt: skip
         aligned = object_poses(self.batch, poses)
         offset, _ = offset_truth(seen, truth, aligned)

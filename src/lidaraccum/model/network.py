@@ -24,8 +24,8 @@ FOREGROUND_GATE = -1.0
 second look takes back what is not, but cannot bring in what the first passed over."""
 
 MOST_POINTS = 200_000
-"""So many points of a window are looked at closely by those who bound their time: weights that take
-everything for movable would have all of them."""
+"""So many points of a window are looked at closely by those who bound their time: dense sensors,
+and weights that take everything for movable, would have many more."""
 
 RARE = -2.0
 """Logit that foreground starts from: most pillars hold none."""
@@ -93,10 +93,11 @@ class Perception:
         dynamic: (Q,) logit: on something that does move.
         offset: (Q, 2) metres, x and y from the position to its object's centre in the target
             frame, level axes.
-        features: Motion features (q, D) of the points of each frame, apart: they are large, and few
-            are asked for again.
-        base: (Q, C) base features of the point's own frame.
         seconds: (Q,) of the point's frame from the target.
+        speaker: (Q,) int64, ascending: which of the K points that were read speaks for each.
+        features: Motion features (k, D) of the points that were read of each frame, apart: they are
+            large, and few are asked for again.
+        base: (K, C) base features of their own frames.
     """
 
     windows: Windows
@@ -106,19 +107,28 @@ class Perception:
     foreground: torch.Tensor
     dynamic: torch.Tensor
     offset: torch.Tensor
+    seconds: torch.Tensor
+    speaker: torch.Tensor
     features: tuple[torch.Tensor, ...]
     base: torch.Tensor
-    seconds: torch.Tensor
 
     @property
     def feature(self) -> torch.Tensor:
-        """(Q, D): the features in one tensor, a copy."""
+        """(K, D): the features in one tensor, a copy."""
         return torch.cat(self.features)
 
     def features_of(self, chosen: torch.Tensor) -> torch.Tensor:
-        """(K, D) features of the points that are chosen (Q,), in order."""
-        parts = torch.split(chosen, [len(one) for one in self.features])
-        return torch.cat([one[own] for one, own in zip(self.features, parts, strict=True)])
+        """(N, D) features of the points that are chosen (Q,), in order."""
+        wanted, first, parts = self.speaker[chosen], 0, []
+        for one in self.features:
+            own = wanted[(wanted >= first) & (wanted < first + len(one))] - first
+            parts.append(one[own])
+            first += len(one)
+        return torch.cat(parts)
+
+    def base_of(self, chosen: torch.Tensor) -> torch.Tensor:
+        """(N, C) base features of the points that are chosen (Q,), in order."""
+        return self.base[self.speaker[chosen]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,6 +243,7 @@ class Network(nn.Module):
         windows: Windows,
         points: torch.Tensor | None = None,
         *,
+        most: int = 0,
         detach: bool = False,
     ) -> Perception:
         """Motion and offsets of the points in foreground pillars.
@@ -242,6 +253,8 @@ class Network(nn.Module):
             target_from_frame: (F, 4, 4) poses, sensor coordinates: the caller's.
             windows: Which frames make which window.
             points: (Q,) int64, ascending: the points to look at; `close_points` when None.
+            most: Read about so many; of more, every second or third of a pillar, which speaks for
+                those above it up to the next. 0 for all.
             detach: Keep the motion branch's gradient out of the base features.
         """
         frames = features.frames
@@ -261,15 +274,16 @@ class Network(nn.Module):
         xyz = frames.points[point]
         position = move(level[frame], xyz[:, None])[:, 0]
         seconds = torch.tensor(windows.gaps(frames.stamps), device=device).float()[frame]
-        counts = torch.bincount(frame, minlength=len(frames)).tolist()
-        centre = frames.pillar_centres()[frames.pillar[point]]
+        spoken, speaker = _speakers(frames.pillar[point], len(point) // most + 1 if most else 1)
+        counts = torch.bincount(frame[spoken], minlength=len(frames)).tolist()
+        centre = frames.pillar_centres()[frames.pillar[point[spoken]]]
         told = torch.cat(
             [
-                xyz[:, :2],
-                position[:, :2],
-                (xyz[:, :2] - centre) / frames.pillar_m,
-                frames.height[point, None],
-                seconds[:, None],
+                xyz[spoken, :2],
+                position[spoken, :2],
+                (xyz[spoken, :2] - centre) / frames.pillar_m,
+                frames.height[point[spoken], None],
+                seconds[spoken, None],
             ],
             dim=1,
         )
@@ -281,9 +295,11 @@ class Network(nn.Module):
         ]
         feature, *others = zip(*said, strict=True)
         foreground, dynamic, offset, own_base = map(torch.cat, others)
+        aside = position[spoken[speaker], :2] - position[:, :2]  # all point to the same centre
         return Perception(
-            windows, point, frame, position, foreground, dynamic, offset,
-            feature, own_base, seconds,
+            windows, point, frame, position,
+            foreground[speaker], dynamic[speaker], offset[speaker] + aside,
+            seconds, speaker, feature, own_base,
         )  # fmt: skip
 
     def _say(
@@ -324,7 +340,7 @@ class Network(nn.Module):
             len(ids),
         )
         motions = self.tube_net(
-            tubes, perception.features_of(instance > 0), perception.base[chosen]
+            tubes, perception.features_of(instance > 0), perception.base_of(instance > 0)
         )
         return ObjectMotions(
             ids=ids,
@@ -349,10 +365,19 @@ def close_points(features: FrameFeatures) -> torch.Tensor:
     return torch.nonzero(passed[features.frames.pillar])[:, 0]
 
 
-def some_close_points(features: FrameFeatures) -> torch.Tensor:
-    """As `close_points`, but of more than `MOST_POINTS` only every second or third."""
-    points = close_points(features)
-    return points[:: len(points) // MOST_POINTS + 1]
+def _speakers(pillar: torch.Tensor, every: int) -> tuple[torch.Tensor, torch.Tensor]:
+    """Which of points (Q,), by their pillars, are read, (K,), and which of those speaks for each.
+
+    Every so many of each pillar from its first on; both int64, ascending.
+    """
+    count = torch.arange(len(pillar), device=pillar.device)
+    if every == 1:
+        return count, count
+    begins = torch.ones_like(pillar, dtype=torch.bool)
+    begins[1:] = pillar[1:] != pillar[:-1]
+    first = torch.cummax(torch.where(begins, count, 0), dim=0).values
+    reads = (count - first) % every == 0
+    return torch.nonzero(reads)[:, 0], torch.cumsum(reads, dim=0) - 1
 
 
 def build_network(settings: NetworkSettings | None = None, seed: int = 0) -> Network:

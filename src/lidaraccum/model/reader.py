@@ -18,7 +18,7 @@ from lidaraccum.model.batch import prepare, to_arrays, to_indices, to_tensors
 from lidaraccum.model.bytes import in_bytes
 from lidaraccum.model.checkpoint import load_network
 from lidaraccum.model.motion import Windows
-from lidaraccum.model.network import FrameFeatures, Network, Perception, some_close_points
+from lidaraccum.model.network import MOST_POINTS, FrameFeatures, Network, Perception
 from lidaraccum.model.precision import inference
 from lidaraccum.model.reading import FrameReading, ObjectReading, WindowReading
 from lidaraccum.model.weights import weights_hash
@@ -121,7 +121,7 @@ class NetworkReader:
                 features,
                 torch.from_numpy(poses.astype(np.float32)),
                 Windows.single(len(places), places.index(target)),
-                some_close_points(features),
+                most=MOST_POINTS,
             )
         sensor_from_level = _sensor_from_level(features, places.index(target))
         offset = to_arrays(seen.offset)

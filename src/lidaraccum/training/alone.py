@@ -13,7 +13,7 @@ from lidaraccum.geometry.voxel import voxel_keys
 from lidaraccum.model.batch import FrameTensors, to_arrays, to_indices
 from lidaraccum.model.kabsch import chain, invert, move
 from lidaraccum.model.motion import Windows
-from lidaraccum.model.network import FrameFeatures, Network, Perception, some_close_points
+from lidaraccum.model.network import MOST_POINTS, FrameFeatures, Network, Perception
 
 VOXEL_M = 0.15
 """The paper, section 3.4: points are thinned before they are clustered."""
@@ -45,7 +45,7 @@ def answer_alone(
     """What the network says of one window, with its own poses of the source frames."""
     frames, target = features.frames, windows.target[0]
     poses = own_poses(windows, target_from_source)
-    seen = network.perceive(features, poses, windows, some_close_points(features))
+    seen = network.perceive(features, poses, windows, most=MOST_POINTS)
     movable = seen.foreground > 0
     moving = movable & (seen.dynamic > 0)
     ids = torch.zeros_like(seen.point)
