@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from lidaraccum.pipeline.courses import turned, way
 from lidaraccum.pipeline.gathering import (
     length_along,
     seconds_at_place,
+    with_middle,
     without_flanks,
     without_strays,
 )
@@ -103,6 +105,44 @@ def _seen_halfway(frame: Passing, angle: float) -> Passing:
 def test_a_vehicle_keeps_its_unaccused_side() -> None:
     kept = left_of(passing(0.0, (0.4, 0.4), (0.5, 0.0)), 0.0)
     assert kept == [list(range(700))] * 3
+
+
+@dataclass(frozen=True)
+class Blinkered(Passing):
+    """A frame whose points are one cluster, and that saw nothing where others have theirs."""
+
+    sensor_from_world: None = None
+
+    @property
+    def view(self) -> Blinkered:
+        return self
+
+    def look(self, points: np.ndarray, sensor_from_world: None) -> SimpleNamespace:
+        nothing = np.zeros(len(points), dtype=np.bool_)
+        return SimpleNamespace(through=nothing, met=nothing)
+
+    def in_clusters_of(self, picked: np.ndarray) -> np.ndarray:
+        return np.ones(len(self.points), dtype=np.bool_)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.5])
+def test_a_bus_is_as_long_as_all_frames_together_tell(turn: float) -> None:
+    """Each frame shows through one of its ends alone; the shop window beside it stays."""
+    frames = [
+        Blinkered(frame.index, frame.stamp, frame.points, frame.through, frame.met)
+        for frame in passing(turn, (1.25, 4.0), (0.0, 0.0))[:2]
+    ]
+    picked = {}
+    for frame, end in zip(frames, (-1, 1), strict=True):
+        ahead = turned(VELOCITY, turn * frame.stamp)
+        along = (frame.points - way(VELOCITY, turn, frame.stamp)) @ (ahead / np.linalg.norm(ahead))
+        picked[frame.index] = np.flatnonzero((end * along > 4.0) & (np.arange(700) < 400))
+    course = np.zeros(3), 0.0, turn
+    filled = with_middle(picked, VELOCITY, frames, *course)  # type: ignore[arg-type]
+    for frame in frames:
+        mine = filled[frame.index]
+        assert len(mine) > 0.93 * 400  # the outermost is its, where it was picked
+        assert (mine < 400).all()
 
 
 def test_few_points_far_from_the_others_are_not_a_movers() -> None:

@@ -234,6 +234,49 @@ class StoppingOracle(Oracle):
         return FrameReading(said.foreground, moves, said.offset)
 
 
+def close(street: Any, mover: int) -> list[np.ndarray]:
+    """For each frame: which points are on a mover and as near as the carrier may be."""
+    return [
+        (np.linalg.norm(frame.frame.points, axis=1) < 2.5) & (on == mover)
+        for frame, on in zip(street.frames, street.on, strict=True)
+    ]
+
+
+def test_what_goes_beside_the_carrier_is_whole(look: Any, new_mover: Any) -> None:
+    """The middle of a bus that keeps pace is never farther away than the carrier may be."""
+    bus = new_mover(low=(-5.0, 1.4, 0.2), size=(12.0, 2.5, 3.0), velocity=(6.0, 0.0, 0.0))
+    street = look([bus], count=9, speed=6.0)
+    frames = perceive(street, Oracle(street, [bus]))
+    for frame, near in zip(frames, close(street, 1), strict=True):
+        assert near.sum() > 2000
+        assert (frame.label[near] == MOVING).mean() > 0.9
+    assert moved_share(frames, street.on) < 0.005
+
+
+class StandingOracle(Oracle):
+    """Says of all its movers that they can move and do not."""
+
+    def _say(self, frame: Frame, world_from_sensor: np.ndarray, then: float) -> FrameReading:
+        said = super()._say(frame, world_from_sensor, then)
+        return FrameReading(said.foreground, 0 * said.dynamic, said.offset)
+
+
+def test_a_parked_car_is_whole_beside_the_carrier_and_the_carrier_is_none(
+    look: Any, new_mover: Any
+) -> None:
+    parked = new_mover(low=(3.0, 1.3, 0.2), size=(4.2, 1.8, 1.45), velocity=(0.0, 0.0, 0.0))
+    carrier = new_mover(low=(-2.0, -0.9, 0.2), size=(4.0, 1.8, 1.2), velocity=(6.0, 0.0, 0.0))
+    street = look([parked, carrier], count=9, speed=6.0)
+    frames = perceive(street, StandingOracle(street, [parked, carrier]))
+    passed = 0
+    for frame, car, own in zip(frames, close(street, 1), close(street, 2), strict=True):
+        passed += car.sum()
+        assert (frame.label[car] == STILL).sum() >= 0.9 * car.sum()
+        assert own.sum() > 5000
+        assert (frame.label[own] == BACKGROUND).all()
+    assert passed > 10_000
+
+
 class GreedyOracle(Oracle):
     """Takes all that stands beside a mover for a part of it."""
 

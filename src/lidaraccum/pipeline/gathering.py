@@ -31,6 +31,9 @@ MOST_GROWTH = 8.0
 BOX_MARGIN_M = 0.3
 """So far outside a mover's box, or its strip, nothing is its own."""
 
+WHOLE_QUANTILES = (0.005, 0.995)
+"""A mover is at least as long and wide as these of its points, of all frames put together."""
+
 STANDING_SHARE = 0.1
 STANDING_MARGIN = 0.1
 """With more than this share of points that were met and never seen through, each is asked whether
@@ -212,11 +215,9 @@ def without_flanks(
         return dict(picked)
     places, accused = [], []
     for frame in shown:
-        mine, seconds = picked[frame.index], frame.stamp - stamp
-        ahead = turned(velocity, turn * seconds)[:2] / np.linalg.norm(velocity[:2])
-        axes = np.array([ahead, [-ahead[1], ahead[0]]]).T
-        here = centre[:2] + way(velocity, turn, seconds)[:2]
-        places.append((frame.world(mine)[:, :2] - here) @ axes)
+        mine = picked[frame.index]
+        course = _Course.at(frame.stamp - stamp, centre, velocity, turn)
+        places.append(course.places(frame.world(mine)))
         accused.append(frame.through[mine] > frame.met[mine])
     stays = ~_is_flank(np.concatenate(places), np.concatenate(accused))
     parts = np.split(stays, np.cumsum([len(one) for one in places])[:-1])
@@ -283,20 +284,27 @@ def with_middle(
     picked: Mapping[int, NDArray[np.int64]],
     velocity: NDArray[np.float64],
     frames: Sequence[SightedFrame],
+    centre: NDArray[np.float64],
     stamp: float,
     turn: float,
     most_growth: float = np.inf,
 ) -> dict[int, NDArray[np.int64]]:
     """A mover's points and what lies between them in their clusters, unless it is seen to stand.
 
-    A long side that slides along itself is seen through at its ends only. What stands is seen there
-    when the mover is elsewhere. Nothing is added that has ``most_growth`` times its points.
+    A long side that slides along itself is seen through at its ends only, and in some frames at one
+    of them: it is as long as all frames together tell. What stands is seen there when the mover is
+    elsewhere. Nothing is added that has ``most_growth`` times its points.
     """
     shown = [frame for frame in frames if len(picked.get(frame.index, ()))]
-    boxes = {}
-    for frame in shown:
-        there = turned(velocity, turn * (frame.stamp - stamp))[:2]
-        boxes[frame.index] = _Box.about(frame.world(picked[frame.index]), there)
+    course = {
+        frame.index: _Course.at(frame.stamp - stamp, centre, velocity, turn) for frame in shown
+    }
+    places = [course[frame.index].places(frame.world(picked[frame.index])) for frame in shown]
+    low, high = np.quantile(np.concatenate(places), WHOLE_QUANTILES, axis=0)
+    boxes = {
+        index: _Box(one, np.minimum(low, own.min(axis=0)), np.maximum(high, own.max(axis=0)))
+        for (index, one), own in zip(course.items(), places, strict=True)
+    }
     filled = dict(picked)
     for frame in shown:
         mine = picked[frame.index]
@@ -326,30 +334,53 @@ def _others_of_clusters(frame: SightedFrame, picked: NDArray[np.int64]) -> NDArr
 
 
 @dataclass(frozen=True, eq=False)
-class _Box:
-    """A level box in the world.
+class _Course:
+    """A mover's level coordinates at one time: along its way and to the left of it.
 
     Attributes:
-        axes: (2, 2) columns: unit vectors along it and across.
-        low: (2,) metres along the axes.
+        here: (2,) metres, world: where its centre is.
+        axes: (2, 2) columns: unit vectors along and to the left.
+    """
+
+    here: NDArray[np.float64]
+    axes: NDArray[np.float64]
+
+    @classmethod
+    def at(
+        cls,
+        seconds: float,
+        centre: NDArray[np.float64],
+        velocity: NDArray[np.float64],
+        turn: float,
+    ) -> _Course:
+        """So long after the time of its centre (3,) and velocity (3,), turning so fast."""
+        ahead = turned(velocity, turn * seconds)[:2]
+        ahead = ahead / np.linalg.norm(ahead)
+        axes = np.array([ahead, [-ahead[1], ahead[0]]]).T
+        return cls((centre + way(velocity, turn, seconds))[:2], axes)
+
+    def places(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points (N, 3), world, along and to the left (N, 2), metres: what goes along stays."""
+        return np.asarray((points[:, :2] - self.here) @ self.axes)
+
+
+@dataclass(frozen=True, eq=False)
+class _Box:
+    """A level box that goes along with a mover.
+
+    Attributes:
+        course: Where the mover is.
+        low: (2,) metres along and to the left.
         high: (2,) as well.
     """
 
-    axes: NDArray[np.float64]
+    course: _Course
     low: NDArray[np.float64]
     high: NDArray[np.float64]
 
-    @classmethod
-    def about(cls, points: NDArray[np.float64], along: NDArray[np.float64]) -> _Box:
-        """The box of points (N, 3), world, along a direction (2,)."""
-        ahead = along / np.linalg.norm(along)
-        axes = np.array([ahead, [-ahead[1], ahead[0]]]).T
-        held = points[:, :2] @ axes
-        return cls(axes, held.min(axis=0), held.max(axis=0))
-
     def holds(self, points: NDArray[np.float64], margin_m: float) -> NDArray[np.bool_]:
         """Which points (N, 3), world, lie in it, grown by a margin."""
-        along, across = (points[:, :2] @ self.axes).T
+        along, across = self.course.places(points).T
         low, high = self.low - margin_m, self.high + margin_m
         inside = (along >= low[0]) & (along <= high[0])
         return inside & (across >= low[1]) & (across <= high[1])

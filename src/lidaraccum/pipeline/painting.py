@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from lidaraccum.data.accumulation import BACKGROUND, MOVING, STILL
 from lidaraccum.data.perceived import PerceivedFrame
 from lidaraccum.geometry import rigid
+from lidaraccum.geometry.clustering import connected_cells
 from lidaraccum.pipeline.association import Track
 from lidaraccum.pipeline.courses import course, turned
 from lidaraccum.pipeline.freespace import SightedFrame
@@ -34,6 +35,8 @@ FOUND_GROWTH = 4.0
 """A mover that no window saw is looked for where it should be, in so many frames; there it is when
 so many points, against its last, and not many times more, lie this near to its shape."""
 
+CLOSE_CELL_M = 0.3
+"""Close points whose cells of this width touch are one thing's."""
 
 _NONE = np.zeros(0, dtype=np.int64)
 
@@ -203,7 +206,10 @@ def _in_box(track: Track, frame: SightedFrame, growth: float) -> NDArray[np.int6
 
 
 def _take_close(track: Track, frame: SightedFrame, canvas: Canvas) -> None:
-    """Give a mover what is on its shape and so close that it might be the carrier's."""
+    """Give a mover what might be the carrier's, so close is it, but touches the mover's shape.
+
+    What goes beside the carrier for long shows the middle of its side from nowhere else.
+    """
     close = frame.close_points
     if len(close) == 0:
         return
@@ -211,7 +217,10 @@ def _take_close(track: Track, frame: SightedFrame, canvas: Canvas) -> None:
     late = frame.seconds_at(close)[:, None] * track.velocities[frame.index]
     world = rigid.transform(frame.world_from_sensor, close) - late
     own = rigid.transform(rigid.invert(track.world_from_object), world)
-    on = track.shape.holds(own) & np.isfinite(track.shape.distances(own, FOUND_M))
+    inside = track.shape.holds(own)
+    touches = inside & np.isfinite(track.shape.distances(own, FOUND_M))
+    part = connected_cells(close, CLOSE_CELL_M)
+    on = inside & (np.bincount(part, touches) > 0)[part]
     if on.sum() < FOUND_GROWTH * track.most_points:
         canvas.paint_close(track, on)
         track.shape.add(own[on])

@@ -90,14 +90,17 @@ def find_objects(
                 proposals = propose(lead.suspect, suspects, frames, settings)
                 found = explain(lead.suspect, proposals, frames, trusting, first=first)
             if found is not None:
-                meant = _meant(found, lead, frames)
+                # What the points are sure of is more than its proposer's outline.
+                is_sure = found.margin > settings.sure_margin and not found.unseen
+                meant = (_outlined if is_sure else _meant)(found, lead, frames)
                 movers = _settle([meant], movers, frames, settings, SURE_SHARE)
     return [_filled(one, frames) for one in join_parts(movers, frames, settings)]
 
 
 def _filled(one: WindowObject, frames: Sequence[SightedFrame]) -> WindowObject:
     most_growth = WHOLE_GROWTH if one.unseen else np.inf
-    picked = with_middle(one.picked, one.velocity, frames, one.stamp, one.turn, most_growth)
+    course = one.centre, one.stamp, one.turn
+    picked = with_middle(one.picked, one.velocity, frames, *course, most_growth)
     return replace(one, picked=picked)
 
 
