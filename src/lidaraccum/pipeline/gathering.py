@@ -44,6 +44,9 @@ OUTLASTING_SHARE = 0.5
 """A mover is at a place while it goes its length and this much more. What was there for longer
 stands beside it; but where more than this share of it would, its length or speed is wrong."""
 
+LONGEST_M = 25.0
+"""Nothing on a road is longer."""
+
 WIDEST_M = 4.0
 FLANK_SHARE = 0.5
 AS_ACCUSED = 0.98

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from lidaraccum.pipeline.courses import are_alike
 from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.gathering import LONGEST_M, length_along
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.objects import TEMPLATE_POINTS, WindowObject
 from lidaraccum.pipeline.suspects import template_of
@@ -56,7 +57,7 @@ def _united_if_one(
     velocities = whole.velocity, part.velocity
     if not are_alike(*velocities, LIKE_SPEED_MPS, LIKE_SPEED_SHARE):
         return None
-    if not _touch(part, whole, frames):
+    if not _touch(part, whole, frames) or _too_long(part, whole, frames):
         return None
     if are_alike(*velocities, SAME_SPEED_MPS, 0.0) or _goes_with(part, whole, frames, settings):
         return _united(whole, part)
@@ -85,6 +86,16 @@ def _touch(part: WindowObject, whole: WindowObject, frames: Sequence[SightedFram
             if _are_near(frame.points[some], frame.points[others]):
                 return True
     return False
+
+
+def _too_long(part: WindowObject, whole: WindowObject, frames: Sequence[SightedFrame]) -> bool:
+    """Whether together they are longer than anything is: one follows the other."""
+    both = [(part.of(frame), whole.of(frame), frame) for frame in frames]
+    return any(
+        length_along(frame.world(np.union1d(some, others)), whole.velocity) > LONGEST_M
+        for some, others, frame in both
+        if len(some) and len(others)
+    )
 
 
 def _are_near(some: NDArray[np.float64], others: NDArray[np.float64]) -> bool:

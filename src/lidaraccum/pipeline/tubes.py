@@ -15,7 +15,12 @@ from lidaraccum.geometry.clustering import dense_groups
 from lidaraccum.model.reading import ObjectReading, WindowReading
 from lidaraccum.pipeline.courses import turned
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.gathering import length_along, seconds_at_place, without_outlasting
+from lidaraccum.pipeline.gathering import (
+    LONGEST_M,
+    length_along,
+    seconds_at_place,
+    without_outlasting,
+)
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.suspects import Lead, Suspect
 
@@ -30,9 +35,6 @@ to one centre make one cell."""
 
 SLOWEST_MPS = 0.5
 """What seems to go slower is not asked how long it was where."""
-
-LONGEST_M = 25.0
-"""Nothing on a road is longer."""
 
 MOST_TUBES = 60
 """So many movers a window are proposed at most, the largest: weights that take everything for
