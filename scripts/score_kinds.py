@@ -69,9 +69,7 @@ def main() -> None:
     parts = [score(network, number, options.extent, tally) for number in numbers]
     whole = SegmentationCounts.pool(parts)
     shown = [one.iou for one in parts if one.true_positive + one.false_negative > FEWEST_POINTS]
-    print(
-        f"foreground IoU {whole.iou:.3f}, P {whole.precision:.3f}, R {whole.recall:.3f}; ", end=""
-    )
+    print(f"foreground IoU {whole.iou:.3f}, P {whole.precision:.3f}, R {whole.recall:.3f};")
     print(f"mean of {len(shown)} windows {np.mean(shown) if shown else np.nan:.3f}\n")
     rows = []
     for kind in sorted({kind for kind, _ in tally}):

@@ -56,8 +56,9 @@ def main() -> None:
                 features.maps, presence_map(features), poses, windows, tensors.stamps, 32.0
             ),
         )
-        most = {"most": MOST_POINTS}
-        seen = timed("perceive", lambda: network.perceive(features, poses, windows, **most))
+        seen = timed(
+            "perceive", lambda: network.perceive(features, poses, windows, most=MOST_POINTS)
+        )
         ids = torch.arange(len(seen.point)) % 30
         timed("track (29 objects)", lambda: network.track(seen, ids))
     reader, still = NetworkReader(network), np.tile(np.eye(4), (5, 1, 1))

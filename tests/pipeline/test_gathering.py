@@ -145,6 +145,13 @@ def test_a_bus_is_as_long_as_all_frames_together_tell(turn: float) -> None:
         assert (mine < 400).all()
 
 
+def test_a_mover_of_which_nothing_is_left_is_no_trouble() -> None:
+    frames = passing(0.0, (1.25, 4.0), (0.3, 0.08))
+    course = VELOCITY, frames, np.zeros(3), 0.0, 0.0
+    assert without_flanks({}, *course) == {}  # type: ignore[arg-type]
+    assert with_middle({}, *course) == {}  # type: ignore[arg-type]
+
+
 def test_few_points_far_from_the_others_are_not_a_movers() -> None:
     rng = np.random.default_rng(0)
     body, strays = rng.uniform(0, 1, (300, 3)), rng.uniform(4, 4.5, (5, 3))

@@ -276,17 +276,17 @@ class Network(nn.Module):
         seconds = torch.tensor(windows.gaps(frames.stamps), device=device).float()[frame]
         spoken, speaker = _speakers(frames.pillar[point], len(point) // most + 1 if most else 1)
         counts = torch.bincount(frame[spoken], minlength=len(frames)).tolist()
-        centre = frames.pillar_centres()[frames.pillar[point[spoken]]]
+        centre = frames.pillar_centres()[frames.pillar[point]]
         told = torch.cat(
             [
-                xyz[spoken, :2],
-                position[spoken, :2],
-                (xyz[spoken, :2] - centre) / frames.pillar_m,
-                frames.height[point[spoken], None],
-                seconds[spoken, None],
+                xyz[:, :2],
+                position[:, :2],
+                (xyz[:, :2] - centre) / frames.pillar_m,
+                frames.height[point, None],
+                seconds[:, None],
             ],
             dim=1,
-        )
+        )[spoken]
         said = [
             self._say(one, motion_map[window : window + 1], own, half)
             for one, window, own in zip(

@@ -217,6 +217,11 @@ class SightedFrame:
         """Obstacles and low points in the world, (M + L, 3) metres."""
         return rigid.transform(self.world_from_sensor, self.near_points)
 
+    @cached_property
+    def close_world(self) -> NDArray[np.float64]:
+        """Close points in the world, (C, 3) metres."""
+        return rigid.transform(self.world_from_sensor, self.close_points)
+
     @property
     def low_points(self) -> NDArray[np.float64]:
         """(L, 3) the low points, metres, sensor coordinates."""

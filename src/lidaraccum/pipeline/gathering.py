@@ -213,21 +213,35 @@ def without_flanks(
         stamp: Seconds.
         turn: Radians a second.
     """
-    shown = [frame for frame in frames if len(picked.get(frame.index, ()))]
+    shown, _, places = _along(picked, velocity, frames, centre, stamp, turn)
     if not shown:
-        return dict(picked)
-    places, accused = [], []
-    for frame in shown:
-        mine = picked[frame.index]
-        course = _Course.at(frame.stamp - stamp, centre, velocity, turn)
-        places.append(course.places(frame.world(mine)))
-        accused.append(frame.through[mine] > frame.met[mine])
+        return {}
+    own = [picked[frame.index] for frame in shown]
+    accused = [
+        frame.through[mine] > frame.met[mine] for frame, mine in zip(shown, own, strict=True)
+    ]
     stays = ~_is_flank(np.concatenate(places), np.concatenate(accused))
-    parts = np.split(stays, np.cumsum([len(one) for one in places])[:-1])
-    kept = {
-        frame.index: picked[frame.index][part] for frame, part in zip(shown, parts, strict=True)
-    }
-    return {index: mine for index, mine in kept.items() if len(mine)}
+    parts = np.split(stays, np.cumsum([len(mine) for mine in own])[:-1])
+    kept = [mine[part] for mine, part in zip(own, parts, strict=True)]
+    return {frame.index: mine for frame, mine in zip(shown, kept, strict=True) if len(mine)}
+
+
+def _along(
+    picked: Mapping[int, NDArray[np.int64]],
+    velocity: NDArray[np.float64],
+    frames: Sequence[SightedFrame],
+    centre: NDArray[np.float64],
+    stamp: float,
+    turn: float,
+) -> tuple[list[SightedFrame], list[_Course], list[NDArray[np.float64]]]:
+    """The frames that show a mover, where it is in each, and places (K, 2) of its points there."""
+    shown = [frame for frame in frames if len(picked.get(frame.index, ()))]
+    courses = [_Course.at(frame.stamp - stamp, centre, velocity, turn) for frame in shown]
+    places = [
+        course.places(frame.world(picked[frame.index]))
+        for frame, course in zip(shown, courses, strict=True)
+    ]
+    return shown, courses, places
 
 
 def _is_flank(places: NDArray[np.float64], accused: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -298,17 +312,15 @@ def with_middle(
     of them: it is as long as all frames together tell. What stands is seen there when the mover is
     elsewhere. Nothing is added that has ``most_growth`` times its points.
     """
-    shown = [frame for frame in frames if len(picked.get(frame.index, ()))]
-    course = {
-        frame.index: _Course.at(frame.stamp - stamp, centre, velocity, turn) for frame in shown
-    }
-    places = [course[frame.index].places(frame.world(picked[frame.index])) for frame in shown]
+    filled = dict(picked)
+    shown, courses, places = _along(picked, velocity, frames, centre, stamp, turn)
+    if not shown:
+        return filled
     low, high = np.quantile(np.concatenate(places), WHOLE_QUANTILES, axis=0)
     boxes = {
-        index: _Box(one, np.minimum(low, own.min(axis=0)), np.maximum(high, own.max(axis=0)))
-        for (index, one), own in zip(course.items(), places, strict=True)
+        frame.index: _Box(one, np.minimum(low, own.min(axis=0)), np.maximum(high, own.max(axis=0)))
+        for frame, one, own in zip(shown, courses, places, strict=True)
     }
-    filled = dict(picked)
     for frame in shown:
         mine = picked[frame.index]
         near = _others_of_clusters(frame, mine)

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidaraccum.geometry import rigid
 from lidaraccum.geometry.clustering import dense_groups
 from lidaraccum.model.reading import FrameReading
 from lidaraccum.pipeline.advice import Leads
@@ -157,5 +156,4 @@ class NetworkAdvice:
 def _standing(frame: SightedFrame) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Rows (K,) of what stands on the ground, the carrier perhaps among it, and places (K, 2)."""
     rows = np.concatenate([frame.rows, frame.low_rows, frame.close_rows])
-    close = rigid.transform(frame.world_from_sensor, frame.close_points)
-    return rows, np.concatenate([frame.near_world, close])[:, :2]
+    return rows, np.concatenate([frame.near_world, frame.close_world])[:, :2]

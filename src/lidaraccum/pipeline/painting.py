@@ -215,10 +215,12 @@ def _take_close(track: Track, frame: SightedFrame, canvas: Canvas) -> None:
         return
     assert track.shape is not None
     late = frame.seconds_at(close)[:, None] * track.velocities[frame.index]
-    world = rigid.transform(frame.world_from_sensor, close) - late
+    world = frame.close_world - late
     own = rigid.transform(rigid.invert(track.world_from_object), world)
     inside = track.shape.holds(own)
     touches = inside & np.isfinite(track.shape.distances(own, FOUND_M))
+    if not touches.any():
+        return
     part = connected_cells(close, CLOSE_CELL_M)
     on = inside & (np.bincount(part, touches) > 0)[part]
     if on.sum() < FOUND_GROWTH * track.most_points:
