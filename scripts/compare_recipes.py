@@ -4,12 +4,14 @@ Usage: compare_recipes.py RECIPES.toml -o FOLDER [--drive DIR]... [--dry-run]
 
 FOLDER gets table.md and table.json, written anew after each run, and NAME/seed-N of each run. What
 is done is not done again: stopped or killed, the same command goes on. scripts/recipes.toml is an
-example of RECIPES.toml and says what may stand in it.
+example of RECIPES.toml and says what may stand in it. Where the file has factors instead of
+recipes (scripts/screening.toml), each run sets about half of them, and effects.md and effects.json
+tell what each does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,21 +23,27 @@ from lidaraccum.cli.options import read_toml
 from lidaraccum.cli.tables import merged, settings_from
 from lidaraccum.cli.train_talk import Interrupts
 from lidaraccum.errors import SettingsError
-from lidaraccum.evaluation.recipe_table import recipe_data, recipe_tables
+from lidaraccum.evaluation.recipe_table import (
+    effect_data,
+    effect_tables,
+    recipe_data,
+    recipe_tables,
+)
 from lidaraccum.io.atomic import write_json, write_text
 from lidaraccum.training.comparison import RunResult, compare
 from lidaraccum.training.recipes import PlanSettings, Recipe, check_plan
+from lidaraccum.training.screening import Factor, Screening
 from lidaraccum.training.settings import TrainSettings
 from lidaraccum.training.watch import Watch
 
-BASE, RECIPE, SET = "base", "recipe", "set"
+BASE, RECIPE, SET, FACTOR = "base", "recipe", "set", "factor"
 FOR_ALL = ("seed", "steps", "hours")
 """Settings that the comparison decides for all of its runs."""
 
 
 @dataclass(frozen=True)
 class _Named:
-    """What a [[recipe]] table says beside what it sets."""
+    """What a [[recipe]] or [[factor]] table says beside what it sets."""
 
     name: str = ""
 
@@ -54,7 +62,7 @@ class _Named:
 @click.option("-v", "--verbose", is_flag=True, help="Say what is being done.")
 def main(recipes: Path, output: Path, drives: tuple[Path, ...], **params: Any) -> None:
     """Train each recipe with each seed on one budget, score it, and leave a table."""
-    plan, listed = read_plan(read_toml(recipes), recipes.name)
+    plan, listed, screening = read_plan(read_toml(recipes), recipes.name)
     plan = replace(plan, exam=replace(plan.exam, drives=(*plan.exam.drives, *drives)))
     if params["dry_run"]:
         tell_plan(plan, listed)
@@ -64,34 +72,69 @@ def main(recipes: Path, output: Path, drives: tuple[Path, ...], **params: Any) -
         for result in compare(plan, listed, output, Watch(wants_end=lambda: interrupts.came)):
             done.append(result)
             click.echo(f"{len(done)} of {len(listed) * len(plan.seeds)}: {told(result)}", err=True)
-            leave(output, names, done)
+            leave(output, names, done, screening)
     if interrupts.came:
         click.get_current_context().exit(INTERRUPTED)
 
 
-def read_plan(file: Mapping[str, Any], name: str) -> tuple[PlanSettings, list[Recipe]]:
-    """What the file says: what all recipes have alike, and the recipes in order.
+def read_plan(
+    file: Mapping[str, Any], name: str
+) -> tuple[PlanSettings, list[Recipe], Screening | None]:
+    """What the file says: what all recipes have alike, the recipes in order, their design if any.
 
     Raises:
         SettingsError: It says what it may not, or what cannot be run.
     """
-    own = {key: value for key, value in file.items() if key not in (BASE, RECIPE)}
-    plan = settings_from(PlanSettings, own, name)
+    plan = settings_from(PlanSettings, _without(file, BASE, RECIPE, FACTOR), name)
     base = _settings_table(file.get(BASE, {}), BASE)
-    tables = file.get(RECIPE, [])
-    if not isinstance(tables, list) or not tables:
-        raise SettingsError(f"{name} has no recipe", hint=f"each is a [[{RECIPE}]] table")
-    recipes = [_recipe(base, table) for table in tables]
+    tables, asked = file.get(RECIPE, []), file.get(FACTOR, [])
+    if not all(isinstance(one, list) for one in (tables, asked)) or bool(tables) == bool(asked):
+        hint = f"each is a [[{RECIPE}]], or a [[{FACTOR}]], table"
+        raise SettingsError(f"{name} has either recipes or factors", hint=hint)
+    screening = None
+    if asked:
+        factors = [_factor(table) for table in asked]
+        screening = Screening.of([factor.name for factor in factors])
+        recipes = _screened(base, factors, screening)
+    else:
+        recipes = [_recipe(base, table) for table in tables]
     check_plan(plan, recipes)
-    return plan, recipes
+    return plan, recipes, screening
 
 
 def _recipe(base: Mapping[str, Any], table: Mapping[str, Any]) -> Recipe:
-    rest = {key: value for key, value in table.items() if key != SET}
-    name = settings_from(_Named, rest, RECIPE).name
+    name = settings_from(_Named, _without(table, SET), RECIPE).name
     mine = merged(base, _settings_table(table.get(SET, {}), f"{name}.{SET}"))
+    return _recipe_of(name, mine)
+
+
+def _recipe_of(name: str, table: Mapping[str, Any]) -> Recipe:
     # The budget is the plan's: this one is never run.
-    return Recipe(name, settings_from(TrainSettings, mine | {"steps": 1}, name))
+    return Recipe(name, settings_from(TrainSettings, {**table, "steps": 1}, name))
+
+
+def _factor(table: Mapping[str, Any]) -> Factor:
+    name = settings_from(_Named, _without(table, "low", "high"), FACTOR).name
+    low, high = (_settings_table(table.get(side, {}), f"{name}.{side}") for side in ("low", "high"))
+    if not name or low == high:
+        raise SettingsError(f"factor {name!r} wants a name, and another setting low than high")
+    return Factor(name, low, high)
+
+
+def _without(table: Mapping[str, Any], *keys: str) -> dict[str, Any]:
+    return {key: value for key, value in table.items() if key not in keys}
+
+
+def _screened(
+    base: Mapping[str, Any], factors: Sequence[Factor], screening: Screening
+) -> list[Recipe]:
+    recipes = []
+    for name, row in zip(screening.runs, screening.high, strict=True):
+        table = dict(base)
+        for factor, high in zip(factors, row, strict=False):
+            table = merged(table, factor.high if high else factor.low)
+        recipes.append(_recipe_of(name, table))
+    return recipes
 
 
 def _settings_table(table: Any, name: str) -> Mapping[str, Any]:
@@ -119,10 +162,15 @@ def told(result: RunResult) -> str:
     return f"{result.recipe} seed {result.seed}: {result.windows} windows, {rate:.2f} a second"
 
 
-def leave(folder: Path, names: list[str], done: list[RunResult]) -> None:
+def leave(
+    folder: Path, names: list[str], done: list[RunResult], screening: Screening | None
+) -> None:
     """Write the tables of what is done so far."""
     write_text(folder / "table.md", recipe_tables(names, done), overwrite=True)
     write_json(folder / "table.json", recipe_data(names, done), overwrite=True)
+    if screening is not None:
+        write_text(folder / "effects.md", effect_tables(screening, done), overwrite=True)
+        write_json(folder / "effects.json", effect_data(screening, done), overwrite=True)
 
 
 if __name__ == "__main__":

@@ -70,6 +70,17 @@ set.optimiser.rate = 1e-3
 """
 
 
+FACTORS = """[[factor]]
+name = "fast"
+high.optimiser.rate = 1e-3
+low.optimiser.rate = 1e-4
+
+[[factor]]
+name = "steep"
+high.optimiser.decay = 0.5
+"""
+
+
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
     spec = importlib.util.spec_from_file_location(SCRIPT.stem, SCRIPT)
@@ -233,7 +244,7 @@ def test_what_makes_no_sense_is_refused_before_anything_runs(
 
 
 def test_the_example_holds_recipes_that_differ(script: ModuleType) -> None:
-    plan, recipes = script.read_plan(read_toml(ROOT / "scripts" / "recipes.toml"), "recipes.toml")
+    plan, recipes, _ = script.read_plan(read_toml(ROOT / "scripts" / "recipes.toml"), "it")
     settings = [plan.settings_for(recipe, plan.seeds[0]) for recipe in recipes]
     alike = [
         (mine.name, its.name)
@@ -247,15 +258,85 @@ def test_the_example_holds_recipes_that_differ(script: ModuleType) -> None:
 def test_every_recipe_has_the_same_budget(script: ModuleType, drives: Path, tmp_path: Path) -> None:
     fours = ("set.optimiser.rate = 1e-3", "set.optimiser.batch = 4")
     ten = ("windows = 2\n", "windows = 10\n")
-    plan, recipes = script.read_plan(read_toml(written(tmp_path, drives, fours, ten)), "plan")
+    plan, recipes, _ = script.read_plan(read_toml(written(tmp_path, drives, fours, ten)), "plan")
     assert [plan.settings_for(recipe, 0).steps for recipe in recipes] == [10, 3]
     clock = ("windows = 2\n", "minutes = 90\n")
-    plan, recipes = script.read_plan(read_toml(written(tmp_path, drives, fours, clock)), "plan")
+    plan, recipes, _ = script.read_plan(read_toml(written(tmp_path, drives, fours, clock)), "plan")
     for recipe in recipes:
         settings = plan.settings_for(recipe, 7)
         assert (settings.hours, settings.steps, settings.seed) == (1.5, None, 7)
 
 
 def test_a_plan_without_recipes_is_refused(script: ModuleType) -> None:
-    with pytest.raises(SettingsError, match="no recipe"):
+    with pytest.raises(SettingsError, match="either recipes or factors"):
         script.read_plan({"windows": 1}, "empty.toml")
+
+
+def screened(folder: Path, drives: Path, *changes: tuple[str, str]) -> Path:
+    """The plan with factors in the recipes' stead."""
+    recipes = PLAN[PLAN.index("[[recipe]]") :]
+    factors = FACTORS
+    for old, new in changes:
+        assert old in factors
+        factors = factors.replace(old, new)
+    return written(folder, drives, (recipes, factors), ("seeds = [0, 1]", "seeds = [0]"))
+
+
+def test_half_of_the_runs_set_a_factor(script: ModuleType, drives: Path, tmp_path: Path) -> None:
+    plan, recipes, screening = script.read_plan(read_toml(screened(tmp_path, drives)), "it")
+    assert [recipe.name for recipe in recipes] == list(screening.runs)
+    settings = [plan.settings_for(recipe, 0) for recipe in recipes]
+    rates = [one.optimiser.rate for one in settings]
+    assert rates == [1e-3 if high else 1e-4 for high in screening.high[:, 0]]
+    decays = [one.optimiser.decay for one in settings]
+    assert decays == [0.5 if high else 0.98 for high in screening.high[:, 1]]
+    assert rates.count(1e-3) == decays.count(0.5) == len(recipes) // 2
+
+
+@pytest.mark.slow
+def test_effects_are_told_once_all_has_been_run(
+    script: ModuleType, drives: Path, tmp_path: Path
+) -> None:
+    plan, out = screened(tmp_path, drives), tmp_path / "out"
+    result = run(script, plan, "-o", out)
+    assert result.exit_code == 0, result.stderr
+    _, recipes, screening = script.read_plan(read_toml(plan), "it")
+    ego = {row["recipe"]: row["learned"]["ego"]["mean"] for row in read(out / "table.json")}
+    fast = [ego[name] for name, high in zip(screening.runs, screening.high, strict=True) if high[0]]
+    slow = [value for value in ego.values() if value not in fast]
+    told = read(out / "effects.json")["learned"]["ego"]
+    assert len(fast) == len(slow) == len(recipes) // 2
+    expected = sum(fast) / len(fast) - sum(slow) / len(slow)
+    assert told["factors"]["fast"] == pytest.approx(expected)
+    assert told["chance"] > 0
+    lines = (out / "effects.md").read_text().splitlines()
+    for name in ("fast", "steep", "chance, one sigma"):
+        assert sum(line.startswith(f"| {name} |") for line in lines) == 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("rate = 1e-3", "rat = 1e-3", "did you mean 'rate'"),
+        ("high.optimiser.decay", "hi.optimiser.decay", "'hi', which is no setting"),
+        ("high.optimiser.decay = 0.5", "", "another setting low than high"),
+        ("high.optimiser.decay", "high.steps", "'steps', which all recipes have alike"),
+        ('"steep"', '"fast"', "two factors have one name"),
+        ("[[factor]]", "[[recipe]]\nname = 'a'\n[[factor]]", "either recipes or factors"),
+    ],
+)
+def test_factors_that_make_no_sense_are_refused(
+    script: ModuleType, drives: Path, tmp_path: Path, old: str, new: str, told: str
+) -> None:
+    refused = run(script, screened(tmp_path, drives, (old, new)), "-o", tmp_path / "out")
+    assert refused.exit_code == 2
+    assert told in refused.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_example_screens_what_it_says(script: ModuleType) -> None:
+    plan, recipes, screening = script.read_plan(
+        read_toml(ROOT / "scripts" / "screening.toml"), "it"
+    )
+    settings = {repr(plan.settings_for(recipe, 0)) for recipe in recipes}
+    assert len(settings) == len(recipes) == len(screening.runs)

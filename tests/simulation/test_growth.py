@@ -60,15 +60,15 @@ def test_lines_of_growth_follow_their_ground(maker: Callable[..., Mesh]) -> None
         assert 0.2 < above.max() < 5.0
 
 
-def _world(kind: str) -> World:
+def _world(kind: str, green: float = 1.0) -> World:
     rng = np.random.default_rng(5)
-    return build_world(lay_network(kind, 10.0, rng), 10.0, rng)
+    return build_world(lay_network(kind, 10.0, rng), 10.0, rng, green=green)
 
 
 @pytest.mark.parametrize("kind", ["suburban", "crossing"])
 def test_growth_adds_and_moves_nothing(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     grown = _world(kind)
-    monkeypatch.setattr(worlds, "overgrow", lambda site, blocks, way: None)
+    monkeypatch.setattr(worlds, "overgrow", lambda site, blocks, way, green: None)
     bare = _world(kind)
     count = len(bare.discs)
     assert len(grown.discs) > count
@@ -77,6 +77,13 @@ def test_growth_adds_and_moves_nothing(kind: str, monkeypatch: pytest.MonkeyPatc
         assert before.id == after.id
         assert np.array_equal(before.world_from_object, after.world_from_object)
     assert _green_corners(grown) > 1.2 * _green_corners(bare)
+
+
+def test_gardens_are_as_green_as_asked() -> None:
+    bare, thin, usual, most, more = (
+        _green_corners(_world("suburban", green)) for green in (0.0, 0.3, 1.0, 50.0, 100.0)
+    )
+    assert bare < thin < usual < most == more
 
 
 def _green_corners(world: World) -> int:

@@ -142,6 +142,19 @@ def test_what_is_rare_is_met_more_often_in_every_other_drive(
         replace(toy.WINDOWS, rare=0.0)
 
 
+def test_what_is_simulated_is_as_the_settings_ask(
+    asked: list[DriveSettings], toy: ModuleType
+) -> None:
+    SimulatedDrives(toy.SMALL, toy.WINDOWS).make(1)
+    plain = replace(toy.WINDOWS, green=0.0, rolling_shutter=False, exact=True)
+    SimulatedDrives(toy.SMALL, plain).make(1)
+    usual, asked_for = asked
+    assert (usual.green, usual.rolling_shutter, usual.exact) == (1.0, None, False)
+    assert asked_for == replace(usual, green=0.0, rolling_shutter=False, exact=True)
+    with pytest.raises(SettingsError, match="green"):
+        replace(toy.WINDOWS, green=-1.0)
+
+
 @pytest.mark.parametrize(("seed", "drive"), [(190, 0), (0, 10_000_000)])
 def test_drives_beyond_the_training_seeds_are_refused(
     asked: list[DriveSettings], toy: ModuleType, seed: int, drive: int

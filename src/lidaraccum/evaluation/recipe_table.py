@@ -1,4 +1,4 @@
-"""Recipes beside each other: what their runs came to, mean and spread over the seeds."""
+"""Recipes beside each other: what their runs came to; and what the factors of a screening do."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ from dataclasses import asdict, dataclass
 from math import isfinite, nan
 from typing import Any
 
+import numpy as np
+
 from lidaraccum.evaluation.report_tables import Table
 from lidaraccum.evaluation.table import number
 from lidaraccum.training.comparison import RunResult
+from lidaraccum.training.screening import Screening
 
 LOSSES = ("ego", "foreground", "motion", "offset", "objects")
 IOU = (
@@ -106,6 +109,47 @@ def recipe_data(recipes: Sequence[str], results: Sequence[RunResult]) -> list[di
             row[part.name] = {one.name: asdict(_spread(one, runs)) for one in part.columns}
         rows.append(row)
     return rows
+
+
+def effect_tables(screening: Screening, results: Sequence[RunResult]) -> str:
+    """Tables in Markdown, each with a row for every factor: what it does when it is high."""
+    tables = []
+    for part in _parts(results):
+        columns = [_effects(screening, column, results) for column in part.columns]
+        numbers = np.array([[*effects, chance] for effects, chance in columns]).T
+        names = [*screening.factors, "chance, one sigma"]
+        rows = [
+            [name, *map(_signed, row, part.columns)]
+            for name, row in zip(names, numbers.tolist(), strict=True)
+        ]
+        titles = ["", *(column.title for column in part.columns)]
+        tables.append(Table(part.heading, titles, rows).markdown())
+    intro = "Mean over the runs in which a factor is high, less that over those in which it is low."
+    return "\n\n".join([intro, *tables]) + "\n"
+
+
+def effect_data(screening: Screening, results: Sequence[RunResult]) -> dict[str, Any]:
+    """The same for JSON: by part and column each factor's effect, and one sigma of chance."""
+    data: dict[str, Any] = {}
+    for part in _parts(results):
+        data[part.name] = {}
+        for column in part.columns:
+            effects, chance = _effects(screening, column, results)
+            named = dict(zip(screening.factors, effects.tolist(), strict=True))
+            data[part.name][column.name] = {"chance": chance, "factors": named}
+    return data
+
+
+def _effects(
+    screening: Screening, column: Column, results: Sequence[RunResult]
+) -> tuple[np.ndarray[Any, np.dtype[np.float64]], float]:
+    means = [_spread(column, _runs(name, results)).mean for name in screening.runs]
+    return screening.effects(np.array(means))
+
+
+def _signed(value: float, column: Column) -> str:
+    shown = number(column.scale * value, column.digits)
+    return f"+{shown}" if value > 0 else shown
 
 
 def _parts(results: Sequence[RunResult]) -> list[Part]:

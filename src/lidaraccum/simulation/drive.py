@@ -45,7 +45,9 @@ class SimulatedSequence:
         rng = np.random.default_rng([settings.seed, 2])
         reach = (self.drawn.speed_mps + 2.0) * duration
         network = lay_network(self.drawn.scene, reach, child(rng))
-        self.world: World = build_world(network, reach, child(rng), settings.rare)
+        self.world: World = build_world(
+            network, reach, child(rng), rare=settings.rare, green=settings.green
+        )
         self.ego = self._drive(duration, child(rng))
         self.actors: tuple[Actor, ...] = Traffic(self.world, self.ego, child(rng)).populate()
         self.movables = Movables(self.world.stills, self.actors)

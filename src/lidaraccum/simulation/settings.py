@@ -37,6 +37,8 @@ class DriveSettings:
         zeros: Whether pulses that never came back are delivered as points at 0, 0, 0.
         rare: Lorries, buses, vans, trailers, things on two wheels, oddities (all that is movable
             but cars and people on foot) are so many times as likely as usual where one is drawn.
+        green: So many times as much as drawn stands about properties (what grows from the ground,
+            lines across, cars near it), up to the most that is ever drawn; nothing at 0.
         exact: Without noise, losses, mixed edges or weather; for tests of laws.
     """
 
@@ -53,6 +55,7 @@ class DriveSettings:
     weather: str | None = None
     zeros: bool | None = None
     rare: float = 1.0
+    green: float = 1.0
     exact: bool = False
 
     def __post_init__(self) -> None:
@@ -66,6 +69,8 @@ class DriveSettings:
             raise SettingsError(f"the ego drives 0 to 45 m/s, not {self.speed_mps}")
         if self.rare <= 0.0:
             raise SettingsError(f"rare is a factor above 0, not {self.rare}")
+        if self.green < 0.0:
+            raise SettingsError(f"green is a factor of 0 or more, not {self.green}")
         for word, value, known in (
             ("sensor", self.sensor, (*SENSORS, RANDOM_SENSOR)),
             ("scene", self.scene, SCENE_KINDS),

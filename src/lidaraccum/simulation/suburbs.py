@@ -50,15 +50,16 @@ FREE_M = 0.45
 """Half of what a line of growth takes up."""
 
 
-def overgrow(site: Site, blocks: Sequence[tuple[Block, str]], way: Array) -> None:
+def overgrow(site: Site, blocks: Sequence[tuple[Block, str]], way: Array, green: float) -> None:
     """Fill what is left of the blocks near the ego; how much differs from world to world.
 
     Args:
         site: What is built on; all draws come from its generator.
         blocks: Blocks that were lined, with their styles.
         way: (K, 2) where the ego drives, metres.
+        green: So many times as much as drawn, up to all there may be.
     """
-    much = float(site.rng.beta(1.3, 1.0))
+    much = min(1.0, green * float(site.rng.beta(1.3, 1.0)))
     for block, style in blocks:
         share = much * GREEN[style]
         if share < 0.05 or not _is_seen(block, way):

@@ -46,7 +46,12 @@ class World:
 
 
 def build_world(
-    network: Network, reach_m: float, rng: np.random.Generator, rare: float = 1.0
+    network: Network,
+    reach_m: float,
+    rng: np.random.Generator,
+    *,
+    rare: float = 1.0,
+    green: float = 1.0,
 ) -> World:
     """The world about the ego's way.
 
@@ -55,6 +60,7 @@ def build_world(
         reach_m: How far the ego will drive, metres.
         rng: What is drawn comes from here.
         rare: How many times as likely as usual rare movable kinds are.
+        green: How many times as much as usual grows about properties.
     """
     growing = rng.spawn(1)[0]
     along = network.ego_start + np.linspace(0, max(reach_m, 1.0), 12)
@@ -66,7 +72,8 @@ def build_world(
     _plant_islands(plot, site)
     lined = [one for road in network.roads for one in line_road(site, road, network.kind)]
     plot.rng = growing
-    overgrow(Site(plot, catalogue.drawing_from(growing)), lined, network.ego.at(along)[0])
+    garden = Site(plot, catalogue.drawing_from(growing))
+    overgrow(garden, lined, network.ego.at(along)[0], green)
     ground = [ground_mesh(terrain, network, rng), kerb_mesh(terrain, network, rng)]
     background = merge([*ground, *plot.parts])
     parked = [still.model.mesh.posed(still.world_from_object) for still in plot.stills]

@@ -19,6 +19,7 @@ from lidaraccum.errors import SettingsError
 from lidaraccum.io.atomic import write_json, write_text
 from lidaraccum.model.checkpoint import load_network
 from lidaraccum.training.curves import read_curves
+from lidaraccum.training.cutting import WindowSettings
 from lidaraccum.training.dataset import SimulatedDrives
 from lidaraccum.training.exam import Marks, examine
 from lidaraccum.training.kept import KeptDrives
@@ -170,13 +171,23 @@ class _Run:
             return None
         network, windows = fresh_network(settings).settings, settings.windows
         make = SimulatedDrives(network, windows, DRIVES_SEED).make
-        rare = [f"rare{windows.rare:g}"] if windows.rare != 1.0 else []
-        kind = "-".join(
-            [f"{windows.extent_m:g}m", f"{windows.drive_frames}frames", *rare, *windows.sensors]
-        )
-        folder = shared / kind
+        folder = shared / kind_of_drives(windows)
         folder.mkdir(parents=True, exist_ok=True)
         return KeptDrives(folder, make, settings.keep_drives, network, windows, settings.seed)
+
+
+def kind_of_drives(windows: WindowSettings) -> str:
+    """A folder's name: one for each choice of what decides how drives are made."""
+    shutter = {None: "", True: "rolling", False: "at-once"}[windows.rolling_shutter]
+    words = [
+        f"rare{windows.rare:g}" if windows.rare != 1.0 else "",
+        f"green{windows.green:g}" if windows.green != 1.0 else "",
+        shutter,
+        "exact" if windows.exact else "",
+        *windows.sensors,
+    ]
+    parts = [f"{windows.extent_m:g}m", f"{windows.drive_frames}frames", *filter(None, words)]
+    return "-".join(parts)
 
 
 def _made(drives: KeptDrives, workers: int, wants_end: Callable[[], bool]) -> bool:

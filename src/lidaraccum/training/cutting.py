@@ -34,6 +34,9 @@ class WindowSettings:
             and made-up ones, when empty.
         rare: In every other simulated drive what is movable but no car nor on foot is so many times
             as likely as usual: a lorry that is met once in a hundred windows is not learned.
+        green: Simulated gardens have so many times as much growth as is drawn; none at 0.
+        rolling_shutter: Whether simulated sweeps take their time; drawn when None.
+        exact: Simulated points without noise, losses, mixed edges or weather.
         augment: How windows are changed.
     """
 
@@ -45,6 +48,9 @@ class WindowSettings:
     drive_frames: int = 10
     sensors: tuple[str, ...] = ()
     rare: float = 1.0
+    green: float = 1.0
+    rolling_shutter: bool | None = None
+    exact: bool = False
     augment: AugmentSettings = field(default_factory=AugmentSettings)
 
     def __post_init__(self) -> None:
@@ -56,7 +62,7 @@ class WindowSettings:
             raise SettingsError("a drive has at least as many frames as its longest window")
         if self.windows_per_drive < 1 or self.largest_step < 1:
             raise SettingsError("windows_per_drive and largest_step are at least 1")
-        DriveSettings(rare=self.rare)  # refuses what it cannot be
+        DriveSettings(rare=self.rare, green=self.green)  # refuses what it cannot be
         for name in self.sensors:
             DriveSettings(sensor=name)  # refuses what no sensor is called
 

@@ -66,12 +66,19 @@ class SimulatedDrives:
         number = self.seed * _DRIVES_OF_A_SEED + drive
         if not 0 <= drive < _DRIVES_OF_A_SEED or number >= FIRST_VALIDATION_SEED:
             raise SettingsError(f"there is no drive {drive} of seed {self.seed}")
-        drawn = replace(training_settings(number, self.settings.drive_frames), compensated=True)
+        mine = self.settings
+        drawn = replace(
+            training_settings(number, mine.drive_frames),
+            compensated=True,
+            green=mine.green,
+            rolling_shutter=mine.rolling_shutter,
+            exact=mine.exact,
+        )
         if drive % 2:
-            drawn = replace(drawn, rare=self.settings.rare)
-        if self.settings.sensors:
+            drawn = replace(drawn, rare=mine.rare)
+        if mine.sensors:
             rng = np.random.default_rng([self.seed, drive, 5])
-            drawn = replace(drawn, sensor=str(rng.choice(self.settings.sensors)))
+            drawn = replace(drawn, sensor=str(rng.choice(mine.sensors)))
         return simulate(drawn, self.caster)
 
 

@@ -14,7 +14,7 @@ from lidaraccum.training.objective import ObjectiveSettings
 
 @dataclass(frozen=True)
 class OptimiserSettings:
-    """Adam and its schedule.
+    """The optimiser and its schedule.
 
     Attributes:
         rate: Learning rate at the start.
@@ -26,6 +26,7 @@ class OptimiserSettings:
         warmup_steps: Over which the rate rises from nothing.
         clip: Longest gradient of each part of the network by itself: TubeNet's, with rotations
             counting 50 times, is dozens of times longer than the others' and would drown them.
+        muon: Muon for the layers' matrices, Adam for the rest only (see `training.optimiser`).
         average: Share of the old in the running mean of the weights, which is what is kept.
         batch: Windows a step.
     """
@@ -36,6 +37,7 @@ class OptimiserSettings:
     epoch_steps: int = 1000
     warmup_steps: int = 50
     clip: float = 5.0
+    muon: bool = False
     average: float = 0.999
     batch: int = 2
 
@@ -55,7 +57,7 @@ class TrainSettings:
             levels below those of the weights (see `model.deepen`).
         windows: How windows are cut and changed.
         objective: What the loss is made of.
-        optimiser: Adam and its schedule.
+        optimiser: The optimiser and its schedule.
         seed: Of the weights, the drives and everything drawn.
         keep_drives: So many simulated drives are made once, stored in the run's folder (some 15 MB
             each) and cut anew again and again; 0 simulates a new one each time.

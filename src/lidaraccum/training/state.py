@@ -1,4 +1,4 @@
-"""Where a run stands, in one file: weights, their running mean, Adam's memory, step and clock."""
+"""Where a run stands, in one file: weights, their mean, what the optimiser remembers, the clock."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import torch
 from lidaraccum.errors import SettingsError
 from lidaraccum.model.checkpoint import read_tensors, save_network, write_tensors
 from lidaraccum.model.network import Network
+from lidaraccum.training.optimiser import Optimiser
 from lidaraccum.training.settings import TrainSettings
 
 STATE_FILE = "state.safetensors"
@@ -32,14 +33,14 @@ class RunState:
     Attributes:
         network: Learns.
         average: A network with the running mean of its weights: what is kept.
-        optimiser: Adam.
+        optimiser: Changes it.
         step: Steps done.
         seconds: Time spent, over all resumptions.
     """
 
     network: Network
     average: Network
-    optimiser: torch.optim.Adam
+    optimiser: Optimiser
     step: int = 0
     seconds: float = 0.0
 
@@ -57,11 +58,7 @@ def save_state(state: RunState, settings: TrainSettings, folder: Path) -> None:
     tensors: dict[str, torch.Tensor] = {}
     for prefix, module in (("network", state.network), ("average", state.average)):
         tensors |= {f"{prefix}.{name}": value for name, value in module.state_dict().items()}
-    for name, parameter in state.network.named_parameters():
-        memory = state.optimiser.state.get(parameter, {})
-        for key in ("exp_avg", "exp_avg_sq"):
-            if key in memory:
-                tensors[f"{key}.{name}"] = memory[key]
+    tensors |= state.optimiser.memory()
     metadata = {
         "step": str(state.step),
         "seconds": repr(state.seconds),
@@ -89,7 +86,7 @@ def restore_state(state: RunState, settings: TrainSettings, folder: Path) -> Non
     state.average.load_state_dict(_part(tensors, "average"))
     state.step = int(metadata["step"])
     state.seconds = float(metadata["seconds"])
-    _restore_adam(state, tensors)
+    state.optimiser.recall(tensors, state.step)
 
 
 def _part(tensors: Mapping[str, torch.Tensor], prefix: str) -> dict[str, torch.Tensor]:
@@ -99,14 +96,3 @@ def _part(tensors: Mapping[str, torch.Tensor], prefix: str) -> dict[str, torch.T
         for name, tensor in tensors.items()
         if name.startswith(start)
     }
-
-
-def _restore_adam(state: RunState, tensors: Mapping[str, torch.Tensor]) -> None:
-    means, squares = _part(tensors, "exp_avg"), _part(tensors, "exp_avg_sq")
-    for name, parameter in state.network.named_parameters():
-        if name in means:
-            state.optimiser.state[parameter] = {
-                "step": torch.tensor(float(state.step)),
-                "exp_avg": torch.empty_like(parameter).detach().copy_(means[name]),
-                "exp_avg_sq": torch.empty_like(parameter).detach().copy_(squares[name]),
-            }

@@ -23,6 +23,7 @@ from lidaraccum.training.journal import Journal
 from lidaraccum.training.kept import KeptDrives
 from lidaraccum.training.loader import batches_from
 from lidaraccum.training.objective import LOSS_NAMES
+from lidaraccum.training.optimiser import Optimiser
 from lidaraccum.training.scores import Scores, score_network
 from lidaraccum.training.settings import OptimiserSettings, TrainSettings
 from lidaraccum.training.state import (
@@ -169,11 +170,9 @@ class _Run:
 
     def _step(self, windows: list[TrainingWindow]) -> list[float]:
         state, settings = self.state, self.settings
-        for group in state.optimiser.param_groups:
-            group["lr"] = self._rate()
         losses = self.crew.learn(windows, settings.seed * _SEED_STRIDE + state.step)
         if clip_gradients(state.network, settings.optimiser.clip):
-            state.optimiser.step()
+            state.optimiser.step(self._rate())
         else:  # one window must not end a run of days
             _log.warning("step %d: gradient is not finite, nothing learned", state.step)
         state.step += 1
@@ -233,7 +232,7 @@ def fresh_network(settings: TrainSettings) -> Network:
 def _fresh_state(settings: TrainSettings, device: torch.device) -> RunState:
     network = fresh_network(settings).to(device).train()
     average = copy.deepcopy(network).eval().requires_grad_(False)
-    optimiser = torch.optim.Adam(network.parameters(), lr=settings.optimiser.rate)
+    optimiser = Optimiser(network, settings.optimiser.rate, muon=settings.optimiser.muon)
     return RunState(network, average, optimiser)
 
 
