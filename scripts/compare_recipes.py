@@ -1,6 +1,6 @@
 """Compares training recipes: each trained with each seed on one budget, scored, put into a table.
 
-Usage: compare_recipes.py RECIPES.toml -o FOLDER [--drive DIR]... [--dry-run]
+Usage: compare_recipes.py RECIPES.toml -o FOLDER [--drive DIR]... [--part K/N] [--dry-run]
 
 FOLDER gets table.md and table.json, written anew after each run, and NAME/seed-N of each run. What
 is done is not done again: stopped or killed, the same command goes on. scripts/recipes.toml is an
@@ -11,6 +11,7 @@ tell what each does.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -48,6 +49,21 @@ class _Named:
     name: str = ""
 
 
+class Part(click.ParamType):
+    """K/N, every N-th of a list from the K-th on, as a slice."""
+
+    name = "part"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> slice:
+        """The slice."""
+        told = re.fullmatch(r"([1-9]\d*)/([1-9]\d*)", value)
+        if told is None or int(told[1]) > int(told[2]):
+            self.fail(f"{value!r} is no part: 1/2 and 2/2 are", param, ctx)
+        return slice(int(told[1]) - 1, None, int(told[2]))
+
+
 @click.command(cls=Command)
 @click.argument("recipes", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @click.option("-o", "--output", type=click.Path(path_type=Path, file_okay=False), required=True)
@@ -58,12 +74,21 @@ class _Named:
     multiple=True,
     help="Score on this labelled recording, too.",
 )
+@click.option(
+    "--part",
+    type=Part(),
+    default="1/1",
+    metavar="K/N",
+    help="Do only every N-th recipe from the K-th on; N such commands share one folder, and one "
+    "without --part then makes the tables of all.",
+)
 @click.option("--dry-run", is_flag=True, help="Say what would be run, do nothing.")
 @click.option("-v", "--verbose", is_flag=True, help="Say what is being done.")
-def main(recipes: Path, output: Path, drives: tuple[Path, ...], **params: Any) -> None:
+def main(recipes: Path, output: Path, drives: tuple[Path, ...], part: slice, **params: Any) -> None:
     """Train each recipe with each seed on one budget, score it, and leave a table."""
     plan, listed, screening = read_plan(read_toml(recipes), recipes.name)
     plan = replace(plan, exam=replace(plan.exam, drives=(*plan.exam.drives, *drives)))
+    listed = listed[part]
     if params["dry_run"]:
         tell_plan(plan, listed)
         return
@@ -72,7 +97,8 @@ def main(recipes: Path, output: Path, drives: tuple[Path, ...], **params: Any) -
         for result in compare(plan, listed, output, Watch(wants_end=lambda: interrupts.came)):
             done.append(result)
             click.echo(f"{len(done)} of {len(listed) * len(plan.seeds)}: {told(result)}", err=True)
-            leave(output, names, done, screening)
+            if part.step == 1:
+                leave(output, names, done, screening)
     if interrupts.came:
         click.get_current_context().exit(INTERRUPTED)
 

@@ -29,14 +29,11 @@ UNCLEAR = 1.0
 SETTLED_M, SETTLED_RAD = 0.02, 0.001
 """The first frames are solved again as long as the first motion changes by more."""
 
-CLEARLY_BETTER = 0.99
+CLEARLY_BETTER = 0.98
 """Of two clocks one leaves less than this share of the other's misfit."""
 
 NO_WORSE = 1.0
 """The share where the points say nothing of the clock."""
-
-LEAST_OVERLAP = 1e-3
-"""Frames of which no more fits than this fit nowhere, whatever is near."""
 
 
 class Opening:
@@ -87,9 +84,9 @@ class Opening:
         The misfit must be less than a share of that without the times.
         """
         by_times = self._settled(passed, timed)
-        hoped = self._passage.tracker.judge.first
+        hoped, misfit = self._passage.tracker.judge.first, self._misfit()
         without = self._settled(passed, seeming)
-        if _misfit(by_times) > share * _misfit(without):
+        if misfit > share * self._misfit():
             return without
         return self._run(timed, self._first_twist(by_times), hoped)
 
@@ -177,6 +174,14 @@ class Opening:
         axis = passed[0].world_from_sensor[:3, :3].T @ np.linalg.eigh(axes.T @ axes)[1][:, 2]
         return SteadyMotion(list(passage.tracker.sights), np.cumsum([0.0, *steps]), surface, axis)
 
+    def _misfit(self) -> float:
+        """Metres between points and map, more where fewer points lie on it at all.
+
+        The distances alone are those of points that fit: what fits badly leaves them, and they
+        shrink.
+        """
+        return float(np.mean(self._passage.tracker.misfits))
+
     def _first_twist(self, passed: list[RegisteredFrame]) -> NDArray[np.float64]:
         """Motion at the first frame: the first step, unless the next ones disagree with it."""
         steps = self._step_twists(passed)
@@ -204,16 +209,6 @@ def _adrift(frame: RegisteredFrame) -> RegisteredFrame:
     if ADRIFT in doubts:
         return frame
     return replace(frame, quality=replace(frame.quality, doubts=(*doubts, ADRIFT)))
-
-
-def _misfit(registered: list[RegisteredFrame]) -> float:
-    """Metres between points and map, more where fewer points lie on it at all.
-
-    The distances alone are those of points that fit: what fits badly leaves them, and they shrink.
-    The first frame has nothing to lie on.
-    """
-    distance = float(np.mean([one.quality.residual_m for one in registered[1:]]))
-    return distance / max(_mean_overlap(registered), LEAST_OVERLAP)
 
 
 def _mean_overlap(registered: list[RegisteredFrame]) -> float:

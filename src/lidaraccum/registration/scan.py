@@ -32,6 +32,7 @@ class Scan:
         raw: The frame as read.
         usable: (N,) bool: points that registration may use.
         rows: (M,) int64: the thin choice of them that is aligned.
+        dense_rows: (L,) int64: the dense choice that has the last word.
         fractions: (N,) time of each point from the stamp in frame intervals; None: no motion
             inside the sweep.
         interval_s: Seconds of a frame interval.
@@ -41,6 +42,7 @@ class Scan:
     raw: Frame
     usable: BoolArray
     rows: NDArray[np.int64]
+    dense_rows: NDArray[np.int64]
     fractions: NDArray[Any] | None = None
     interval_s: float = DEFAULT_INTERVAL_S
 
@@ -51,10 +53,17 @@ class Scan:
 
     def source(self, twist: NDArray[np.float64]) -> NDArray[np.float64]:
         """The chosen points (M, 3) at the stamp, had the sensor moved by ``twist`` (6,)."""
-        points = self.raw.points.take(self.rows, axis=0).astype(np.float64)
+        return self._at_stamp(self.rows, twist)
+
+    def dense_source(self, twist: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Likewise of the dense choice (L, 3)."""
+        return self._at_stamp(self.dense_rows, twist)
+
+    def _at_stamp(self, rows: NDArray[np.int64], twist: NDArray[np.float64]) -> NDArray[np.float64]:
+        points = self.raw.points.take(rows, axis=0).astype(np.float64)
         if self.fractions is None:
             return points
-        return transform_along(twist, self.fractions[self.rows], points)
+        return transform_along(twist, self.fractions[rows], points)
 
     def straightened(self, twist: NDArray[np.float64]) -> Frame:
         """The whole frame at the stamp, had the sensor moved by ``twist`` (6,)."""
@@ -91,8 +100,9 @@ def prepare(
     """Choose which of a frame's points registration may use, and which of them it aligns."""
     usable = _usable_points(raw, settings, static_mask)
     candidates = np.flatnonzero(usable)
-    thin = voxel.thin(raw.points.take(candidates, axis=0), settings.source_voxel_m)
-    return Scan(index, raw, usable, candidates[thin])
+    dense = candidates[voxel.thin(raw.points.take(candidates, axis=0), settings.dense_voxel_m)]
+    thin = dense[voxel.thin(raw.points.take(dense, axis=0), settings.source_voxel_m)]
+    return Scan(index, raw, usable, thin, dense)
 
 
 def _usable_points(

@@ -18,6 +18,8 @@ class RegistrationSettings:
             well they fit, ``refine`` starts from them.
         voxel_m: Edge of the map's finest voxels; two coarser levels double it.
         source_voxel_m: One point per such voxel of a frame is aligned.
+        dense_voxel_m: One point per such voxel has the last word on a pose: few points' noise alone
+            moves it by millimetres.
         min_range_m: Nearer points are the car that carries the sensor.
         max_range_m: Farther points are left out of registration (never out of the result).
         lookahead: Frames solved together at the start, so that the first one is right at speed.
@@ -31,6 +33,7 @@ class RegistrationSettings:
     poses_mode: Literal["given", "refine"] = "given"
     voxel_m: float = 0.5
     source_voxel_m: float = 1.0
+    dense_voxel_m: float = 0.15
     min_range_m: float = 2.5
     max_range_m: float = 100.0
     lookahead: int = 5
@@ -44,7 +47,14 @@ class RegistrationSettings:
             raise SettingsError(f"deskew must be auto or off, not {self.deskew!r}")
         if self.poses_mode not in ("given", "refine"):
             raise SettingsError(f"poses mode must be given or refine, not {self.poses_mode!r}")
-        for name in ("voxel_m", "source_voxel_m", "max_range_m", "max_speed_mps", "max_turn_dps"):
+        for name in (
+            "voxel_m",
+            "source_voxel_m",
+            "dense_voxel_m",
+            "max_range_m",
+            "max_speed_mps",
+            "max_turn_dps",
+        ):
             if not getattr(self, name) > 0:
                 raise SettingsError(f"{name} must be positive, not {getattr(self, name)}")
         if not 0 <= self.min_range_m < self.max_range_m:

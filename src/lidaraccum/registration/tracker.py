@@ -12,7 +12,7 @@ from lidaraccum.data.registered import RegisteredFrame, RegistrationQuality
 from lidaraccum.geometry import rigid
 from lidaraccum.registration.along import open_axis
 from lidaraccum.registration.deskew import SweepClock
-from lidaraccum.registration.icp import align, assess
+from lidaraccum.registration.icp import Alignment, align, assess
 from lidaraccum.registration.locate import Hypothesis, Located, proposed, refine, search
 from lidaraccum.registration.pace import Pace
 from lidaraccum.registration.proposals import Reach
@@ -32,7 +32,14 @@ SAME_TWIST_M, SAME_TWIST_RAD = 0.02, 0.0005
 """A frame is deskewed again when its motion turns out to differ by more from what was assumed."""
 
 MAX_PASSES = 3
+
+LAST_ITERATIONS = 3
+"""Of the dense choice of points: the thin one has brought the pose to within its own noise."""
+
 MAX_REACH_M = 60.0
+
+LEAST_OVERLAP = 1e-3
+"""Frames of which no more fits than this fit nowhere, whatever is near."""
 
 PATIENCE = 3
 """Frames in a row that may be left out of the map as lost before the map starts anew."""
@@ -99,11 +106,13 @@ class Tracker:
         self._eye = Eye()
         self.sights: list[Sight] = []
         self.open_axes: list[NDArray[np.float64]] = []
+        self.misfits: list[float] = []
 
     def forget_opening(self) -> None:
         """Let go of what only the first frames are solved with."""
         self.sights.clear()
         self.open_axes.clear()
+        self.misfits.clear()
 
     def start(self, scan: Scan, pose: rigid.Pose) -> RegisteredFrame:
         """Put the first frame on the empty map."""
@@ -119,6 +128,7 @@ class Tracker:
         self.twist = self._twist_to(pose, steps)
         source = scan.source(self.twist)
         located = Located("given", assess(self._surface, source, pose))
+        self._note_misfit(scan, scan.dense_source(self.twist), pose)
         quality = self.judge.judge(located, self._speed(pose, steps))
         rival = refine(self._surface, source, Hypothesis("given", pose)).alignment
         away_m = float(np.linalg.norm(rival.world_from_sensor[:3, 3] - pose[:3, 3]))
@@ -130,9 +140,10 @@ class Tracker:
     def ride(self, scan: Scan, pose: rigid.Pose, rail: NDArray[np.float64]) -> RegisteredFrame:
         """Put a frame at a pose, as planes have it but for its place along a rail (3,), world."""
         scan, steps = self._timed(scan), self._steps_to(scan)
-        source = scan.source(self._twist_to(pose, steps))
-        placed = align(self._surface, source, pose, rail=rail)
-        located = Located("steady", assess(self._surface, source, placed), sighted=True)
+        twist = self._twist_to(pose, steps)
+        placed = align(self._surface, scan.source(twist), pose, rail=rail)
+        located = Located("steady", self._polished(scan, placed, twist, rail), sighted=True)
+        placed = located.alignment.world_from_sensor
         self.open_axes.append(rail)
         self.twist = self._twist_to(placed, steps)
         quality = self.judge.judge(located, self._speed(placed, steps))
@@ -151,6 +162,8 @@ class Tracker:
             twist = found
             again = refine(self._surface, scan.source(twist), _start_of(located))
             located = replace(located, alignment=again.alignment)
+        pose = located.alignment.world_from_sensor
+        located = replace(located, alignment=self._polished(scan, pose, twist))
         self._look_along(scan, located, expectation.steps)
         return self._conclude(scan, located, expectation)
 
@@ -185,6 +198,24 @@ class Tracker:
         axes = (2,) if expectation.known else (2, 0, 1)
         shifts = proposed(self._surface, source, first.world_from_sensor, reach, axes)
         return search(self._surface, source, [*expectation.starts, *shifts], found)
+
+    def _polished(
+        self,
+        scan: Scan,
+        pose: rigid.Pose,
+        twist: NDArray[np.float64],
+        rail: NDArray[np.float64] | None = None,
+    ) -> Alignment:
+        """What many more points make of a pose; how good it is, the thin choice says as before."""
+        dense = scan.dense_source(twist)
+        pose = align(self._surface, dense, pose, iterations=LAST_ITERATIONS, rail=rail)
+        self._note_misfit(scan, dense, pose)
+        return assess(self._surface, scan.source(twist), pose)
+
+    def _note_misfit(self, scan: Scan, dense: NDArray[np.float64], pose: rigid.Pose) -> None:
+        if self._opens(scan):
+            fit = assess(self._surface, dense, pose)
+            self.misfits.append(fit.residual_m / max(fit.overlap, LEAST_OVERLAP))
 
     def _look_along(self, scan: Scan, located: Located, steps: float) -> None:
         """Note the direction that planes leave open, if they do."""
