@@ -1,4 +1,4 @@
-"""How exact poses are where nothing hinders them: noise of few points must not be what they show."""
+"""How exact poses are where nothing hinders them: the noise of few points must not show in them."""
 
 from __future__ import annotations
 
