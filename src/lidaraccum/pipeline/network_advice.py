@@ -14,6 +14,7 @@ from lidaraccum.geometry.clustering import dense_groups
 from lidaraccum.model.reading import FrameReading
 from lidaraccum.pipeline.advice import Leads
 from lidaraccum.pipeline.freespace import SightedFrame
+from lidaraccum.pipeline.leaves import Leaves
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.object_ids import ObjectIds
 from lidaraccum.pipeline.painting import Canvas
@@ -52,6 +53,7 @@ class NetworkAdvice:
         self._worker = worker
         self._settings = settings
         self._still = StillObjects(ids)
+        self._leaves = Leaves()
         self._places = Places()
         self._unsent: list[SightedFrame] = []
         self._encoded: dict[int, Future[Any]] = {}
@@ -109,7 +111,7 @@ class NetworkAdvice:
         return sorted((one for one in leads if one), key=lambda lead: -len(lead.suspect))
 
     def name_still(self, frame: SightedFrame, canvas: Canvas) -> None:
-        """Movable points that no mover has become objects that stand."""
+        """Movable points that no mover has become objects that stand, unless they are leaves."""
         reading = self._readings.pop(frame.index, None)
         if reading is None:
             return
@@ -123,8 +125,10 @@ class NetworkAdvice:
         counts = np.bincount(cluster[told], minlength=int(cluster.max(initial=0)) + 1)
         groups = [np.flatnonzero(cluster == one) for one in np.flatnonzero(counts >= STILL_POINTS)]
         names = self._still.name([level[group] for group in groups])
+        points = frame.registered.frame.points
         for name, group in zip(names, groups, strict=True):
-            canvas.paint_still(rows[group], name, movable[group])
+            if not self._leaves.are_all_of(name, points[rows[group]]):
+                canvas.paint_still(rows[group], name, movable[group])
 
     def _unread_runs(self, window: Sequence[SightedFrame]) -> Iterator[list[SightedFrame]]:
         """Runs of frames that cover all that was not looked at, each from the one before on."""
