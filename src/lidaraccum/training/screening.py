@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from lidaraccum.errors import SettingsError
 
 SPARE = 3
-"""Columns that no factor has, at least: what they seem to do is chance."""
+"""Columns that no factor has, at least: what they seem to do is chance alone."""
 
 _PRIMES = (7, 11, 19, 23, 31, 43, 47)
 """Of the form 4 k - 1; a design has one run more."""
@@ -77,13 +77,17 @@ class Screening:
             values: (R,) of each run.
 
         Returns:
-            (F,) mean of the high runs less that of the low ones, and one sigma of its error, from
-            the columns that are nobody's; NaN all, unless every run has a value.
+            (F,) mean of the high runs less that of the low ones, and one sigma of its error (Lenth,
+            Quick and easy analysis of unreplicated factorials, 1989): most factors do little, so
+            the usual size of all columns' effects is that of chance. NaN all, unless every run has
+            a value.
         """
         sign = np.where(self.high, 1.0, -1.0)
         contrast = 2.0 / len(values) * sign.T @ values
-        count = len(self.factors)
-        return contrast[:count], float(np.sqrt(np.mean(contrast[count:] ** 2)))
+        size = np.abs(contrast)
+        small = size[size <= 2.5 * 1.5 * np.median(size)]
+        chance = 1.5 * float(np.median(small)) if len(small) else np.nan
+        return contrast[: len(self.factors)], chance
 
 
 def plackett_burman(prime: int) -> NDArray[np.bool_]:
