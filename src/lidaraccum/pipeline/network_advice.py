@@ -29,9 +29,14 @@ SPAN = 5
 MOVABLE_ABOVE = 0.5
 """Points whose probability of being on something movable is higher are."""
 
+SURE_ABOVE = 0.93
+"""What is movable with a mean probability above this need not be smooth: a trailer may be full of
+branches, and a car that parts of the carrier touch is rough."""
+
 STILL_POINTS = 10
 """What stands has so many points in a frame, low ones among them, that are not so close that they
-may be the carrier's. Those which are join the others: the carrier has none but them."""
+may be the carrier's. Those which are join the others: the carrier has none but them. What it is
+made of is asked of the others, too."""
 
 
 class NetworkAdvice:
@@ -121,13 +126,16 @@ class NetworkAdvice:
         free = (movable > MOVABLE_ABOVE) & (canvas.instances(rows) == 0)
         rows, level, movable = rows[free], level[free], movable[free]
         cluster = dense_groups(level + reading.offset[rows], CELL_M, RADIUS_M, NEIGHBOURS)
-        told = (cluster >= 0) & ~np.isin(rows, frame.close_rows)
+        apart = ~np.isin(rows, frame.close_rows)
+        told = (cluster >= 0) & apart
         counts = np.bincount(cluster[told], minlength=int(cluster.max(initial=0)) + 1)
         groups = [np.flatnonzero(cluster == one) for one in np.flatnonzero(counts >= STILL_POINTS)]
         names = self._still.name([level[group] for group in groups])
         points = frame.registered.frame.points
         for name, group in zip(names, groups, strict=True):
-            if not self._leaves.are_all_of(name, points[rows[group]]):
+            of_others = points[rows[group[apart[group]]]]
+            sure = movable[group].mean() > SURE_ABOVE
+            if not self._leaves.are_all_of(name, of_others) or sure:
                 canvas.paint_still(rows[group], name, movable[group])
 
     def _unread_runs(self, window: Sequence[SightedFrame]) -> Iterator[list[SightedFrame]]:
