@@ -31,12 +31,11 @@ MOVABLE_ABOVE = 0.5
 
 SURE_ABOVE = 0.93
 """What is movable with a mean probability above this need not be smooth: a trailer may be full of
-branches, and a car that parts of the carrier touch is rough."""
+branches. Nor need what touches the carrier, whose own parts are rough."""
 
 STILL_POINTS = 10
 """What stands has so many points in a frame, low ones among them, that are not so close that they
-may be the carrier's. Those which are join the others: the carrier has none but them. What it is
-made of is asked of the others, too."""
+may be the carrier's. Those which are join the others: the carrier has none but them."""
 
 
 class NetworkAdvice:
@@ -133,9 +132,8 @@ class NetworkAdvice:
         names = self._still.name([level[group] for group in groups])
         points = frame.registered.frame.points
         for name, group in zip(names, groups, strict=True):
-            of_others = points[rows[group[apart[group]]]]
-            sure = movable[group].mean() > SURE_ABOVE
-            if not self._leaves.are_all_of(name, of_others) or sure:
+            judged = apart[group].all() and movable[group].mean() < SURE_ABOVE
+            if not (judged and self._leaves.are_all_of(name, points[rows[group]])):
                 canvas.paint_still(rows[group], name, movable[group])
 
     def _unread_runs(self, window: Sequence[SightedFrame]) -> Iterator[list[SightedFrame]]:
