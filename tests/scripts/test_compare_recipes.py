@@ -17,7 +17,9 @@ import torch
 from click.testing import CliRunner, Result
 
 from lidaraccum.cli.options import read_toml
+from lidaraccum.cli.tables import settings_from
 from lidaraccum.errors import SettingsError
+from lidaraccum.training.settings import TrainSettings
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "scripts" / "compare_recipes.py"
@@ -253,6 +255,11 @@ def test_the_example_holds_recipes_that_differ(script: ModuleType) -> None:
         if settings[place] == settings[other]
     ]
     assert alike == []
+
+
+def test_the_recipe_is_one_that_train_takes() -> None:
+    table = read_toml(ROOT / "scripts" / "recipe.toml")["train"]
+    assert settings_from(TrainSettings, {**table, "steps": 1}, "train").keep_drives > 0
 
 
 def test_every_recipe_has_the_same_budget(script: ModuleType, drives: Path, tmp_path: Path) -> None:
