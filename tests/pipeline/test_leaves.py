@@ -58,7 +58,7 @@ def test_many_points_of_one_place_tell_no_more_than_few() -> None:
 
 
 def test_what_is_short_or_thinly_seen_is_not_judged() -> None:
-    assert not Leaves().are_all_of(1, bush()[:, [0, 1, 2]] * [0.4, 1.0, 1.0])
+    assert not Leaves().are_all_of(1, bush() * [0.4, 1.0, 1.0])
     assert not Leaves().are_all_of(1, bush()[::200])
     assert roughness(bush()[::200]) is None
 

@@ -238,11 +238,29 @@ def test_a_folder_is_not_gone_on_with_as_something_else(
 def test_what_makes_no_sense_is_refused_before_anything_runs(
     script: ModuleType, drives: Path, tmp_path: Path, old: str, new: str, told: str
 ) -> None:
-    out = tmp_path / "out"
-    refused = run(script, written(tmp_path, drives, (old, new)), "-o", out)
+    assert_refused(script, written(tmp_path, drives, (old, new)), told)
+
+
+def assert_refused(script: ModuleType, plan: Path, told: str) -> None:
+    out = plan.parent / "out"
+    refused = run(script, plan, "-o", out)
     assert refused.exit_code == 2
     assert told in refused.stderr
     assert not out.exists()
+
+
+def test_parts_do_every_recipe_once(script: ModuleType, drives: Path, tmp_path: Path) -> None:
+    plan = written(tmp_path, drives)
+    listed = []
+    for part in ("1/2", "2/2"):
+        told = run(script, plan, "-o", tmp_path / "out", "--part", part, "--dry-run")
+        assert told.exit_code == 0, told.stderr
+        listed += told.stdout.splitlines()[1:]
+    assert listed == ["base", "fast"]
+    for wrong in ("3/2", "0/2", "half"):
+        refused = run(script, plan, "-o", tmp_path / "out", "--part", wrong)
+        assert refused.exit_code == 2
+        assert "is no part" in refused.stderr
 
 
 def test_the_example_holds_recipes_that_differ(script: ModuleType) -> None:
@@ -335,10 +353,7 @@ def test_effects_are_told_once_all_has_been_run(
 def test_factors_that_make_no_sense_are_refused(
     script: ModuleType, drives: Path, tmp_path: Path, old: str, new: str, told: str
 ) -> None:
-    refused = run(script, screened(tmp_path, drives, (old, new)), "-o", tmp_path / "out")
-    assert refused.exit_code == 2
-    assert told in refused.stderr
-    assert not (tmp_path / "out").exists()
+    assert_refused(script, screened(tmp_path, drives, (old, new)), told)
 
 
 def test_the_example_screens_what_it_says(script: ModuleType) -> None:

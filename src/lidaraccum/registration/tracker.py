@@ -128,7 +128,8 @@ class Tracker:
         self.twist = self._twist_to(pose, steps)
         source = scan.source(self.twist)
         located = Located("given", assess(self._surface, source, pose))
-        self._note_misfit(scan, scan.dense_source(self.twist), pose)
+        if self._opens(scan):
+            self._note_misfit(scan.dense_source(self.twist), pose)
         quality = self.judge.judge(located, self._speed(pose, steps))
         rival = refine(self._surface, source, Hypothesis("given", pose)).alignment
         away_m = float(np.linalg.norm(rival.world_from_sensor[:3, 3] - pose[:3, 3]))
@@ -209,13 +210,13 @@ class Tracker:
         """What many more points make of a pose; how good it is, the thin choice says as before."""
         dense = scan.dense_source(twist)
         pose = align(self._surface, dense, pose, iterations=LAST_ITERATIONS, rail=rail)
-        self._note_misfit(scan, dense, pose)
+        if self._opens(scan):
+            self._note_misfit(dense, pose)
         return assess(self._surface, scan.source(twist), pose)
 
-    def _note_misfit(self, scan: Scan, dense: NDArray[np.float64], pose: rigid.Pose) -> None:
-        if self._opens(scan):
-            fit = assess(self._surface, dense, pose)
-            self.misfits.append(fit.residual_m / max(fit.overlap, LEAST_OVERLAP))
+    def _note_misfit(self, dense: NDArray[np.float64], pose: rigid.Pose) -> None:
+        fit = assess(self._surface, dense, pose)
+        self.misfits.append(fit.residual_m / max(fit.overlap, LEAST_OVERLAP))
 
     def _look_along(self, scan: Scan, located: Located, steps: float) -> None:
         """Note the direction that planes leave open, if they do."""

@@ -171,12 +171,12 @@ class _Run:
             return None
         network, windows = fresh_network(settings).settings, settings.windows
         make = SimulatedDrives(network, windows, DRIVES_SEED).make
-        folder = shared / kind_of_drives(windows)
+        folder = shared / _kind_of_drives(windows)
         folder.mkdir(parents=True, exist_ok=True)
         return KeptDrives(folder, make, settings.keep_drives, network, windows, settings.seed)
 
 
-def kind_of_drives(windows: WindowSettings) -> str:
+def _kind_of_drives(windows: WindowSettings) -> str:
     """A folder's name: one for each choice of what decides how drives are made."""
     shutter = {None: "", True: "rolling", False: "at-once"}[windows.rolling_shutter]
     words = [

@@ -31,11 +31,14 @@ class Optimiser:
 
     def __init__(self, network: torch.nn.Module, rate: float, *, muon: bool = False) -> None:
         named = dict(network.named_parameters())
-        matrices = {name for name, weight in named.items() if muon and _is_matrix(weight)}
-        rest = [weight for name, weight in named.items() if name not in matrices]
-        self._adam = torch.optim.Adam(rest, lr=rate)
         self._named = named
-        self._views = {name: torch.nn.Parameter(_matrix(named[name])) for name in matrices}
+        self._views = {
+            name: torch.nn.Parameter(_matrix(weight))
+            for name, weight in named.items()
+            if muon and _is_matrix(weight)
+        }
+        rest = [weight for name, weight in named.items() if name not in self._views]
+        self._adam = torch.optim.Adam(rest, lr=rate)
         self._muon = None
         if self._views:
             self._muon = torch.optim.Muon(
@@ -88,9 +91,10 @@ def _is_matrix(weight: torch.Tensor) -> bool:
 
 def _matrix(weight: torch.Tensor) -> torch.Tensor:
     """(O, I) a row an output channel: of a kernel with channels last a view, as it lies."""
+    weight = weight.detach()
     if weight.ndim == 4:
-        weight = weight.detach().permute(0, 2, 3, 1)
-    return weight.detach().flatten(1)
+        weight = weight.permute(0, 2, 3, 1)
+    return weight.flatten(1)
 
 
 def _set_rate(optimiser: torch.optim.Optimizer, rate: float) -> None:

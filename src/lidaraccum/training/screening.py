@@ -10,7 +10,7 @@ and falls upon the others.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -36,8 +36,8 @@ class Factor:
     """
 
     name: str
-    low: Mapping[str, Any] = field(default_factory=dict)
-    high: Mapping[str, Any] = field(default_factory=dict)
+    low: Mapping[str, Any]
+    high: Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
