@@ -228,3 +228,15 @@ def test_an_object_unseen_in_the_target_is_anchored_to_the_nearest_frame(
     objects = network.track(seen, torch.where(seen.frame >= 2, 3, 0))
     assert objects.tubes.anchor_time.tolist() == [2]
     assert torch.equal(objects.target_from_aligned[0, 2], torch.eye(4))
+
+
+def test_what_stands_is_matched_the_rather_the_higher_its_odds(
+    network: Network, frames: list[Frame]
+) -> None:
+    shares = []
+    for odds in (0.05, 1.0, 16.0):
+        chosen = build_network(replace(network.settings, standing_odds=odds, ego_pillars=64), 3)
+        ego = encode(chosen, frames[:2]).ego
+        assert ego.valid.all()
+        shares.append(float((ego.position[..., 2] > 0.3).float().mean()))
+    assert shares[0] < shares[1] < shares[2]

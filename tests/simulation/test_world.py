@@ -29,6 +29,24 @@ def test_worlds_are_whole_and_roads_are_free(kind: str) -> None:
     assert {Surface.ROAD, Surface.LEAVES} & set(np.unique(mesh.surface))
 
 
+@pytest.mark.parametrize("kind", ["crossing", "square", "roundabout", "industrial"])
+def test_without_street_furniture_nothing_of_it_stands_about(kind: str) -> None:
+    furnished, bare = (
+        build_world(
+            lay_network(kind, 10.0, np.random.default_rng(5)),
+            10.0,
+            np.random.default_rng(5),
+            furniture=furniture,
+        )
+        for furniture in (True, False)
+    )
+    kinds = [set(np.unique(world.mesh.surface)) for world in (furnished, bare)]
+    assert Surface.FURNITURE in kinds[0]
+    assert Surface.FURNITURE not in kinds[1]
+    assert {Surface.ROAD, Surface.LEAVES} & kinds[1]
+    assert bare.stills, "what is parked is no furniture"
+
+
 def test_the_ground_is_where_its_height_says() -> None:
     rng = np.random.default_rng(3)
     network = lay_network("rural", 10.0, rng)

@@ -146,11 +146,14 @@ def test_what_is_simulated_is_as_the_settings_ask(
     asked: list[DriveSettings], toy: ModuleType
 ) -> None:
     SimulatedDrives(toy.SMALL, toy.WINDOWS).make(1)
-    plain = replace(toy.WINDOWS, green=0.0, rolling_shutter=False, exact=True)
+    plain = replace(toy.WINDOWS, green=0.0, furniture=False, rolling_shutter=False, exact=True)
     SimulatedDrives(toy.SMALL, plain).make(1)
     usual, asked_for = asked
     assert (usual.green, usual.rolling_shutter, usual.exact) == (1.0, None, False)
-    assert asked_for == replace(usual, green=0.0, rolling_shutter=False, exact=True)
+    assert usual.furniture
+    assert asked_for == replace(
+        usual, green=0.0, furniture=False, rolling_shutter=False, exact=True
+    )
     with pytest.raises(SettingsError, match="green"):
         replace(toy.WINDOWS, green=-1.0)
 

@@ -7,6 +7,7 @@ from types import ModuleType
 import pytest
 import torch
 
+from lidaraccum.errors import SettingsError
 from lidaraccum.model.kabsch import chain, invert, move
 from lidaraccum.model.motion import Windows
 from lidaraccum.model.network import build_network
@@ -71,6 +72,16 @@ def test_a_detached_motion_branch_leaves_the_backbone_alone(batch: Batch, toy: M
     losses = objective(network, batch, settings, torch.Generator().manual_seed(1))
     (losses.motion + losses.offset).backward()
     assert all(parameter.grad is None for parameter in network.backbone.parameters())
+
+
+def test_the_terms_count_as_they_are_weighted(batch: Batch, toy: ModuleType) -> None:
+    network = build_network(toy.SMALL)
+    settings = ObjectiveSettings(ego_weight=3.0, offset_weight=0.25, object_weight=0.0)
+    losses = objective(network, batch, settings, torch.Generator().manual_seed(2))
+    plain = 3.0 * losses.ego + losses.foreground + losses.motion + 0.25 * losses.offset
+    torch.testing.assert_close(losses.total, plain)
+    with pytest.raises(SettingsError, match="weights"):
+        ObjectiveSettings(offset_weight=-0.1)
 
 
 def test_the_same_lot_gives_the_same_loss(batch: Batch, toy: ModuleType) -> None:

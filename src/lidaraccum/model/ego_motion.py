@@ -10,6 +10,7 @@ import torch
 from torch import nn
 
 from lidaraccum.model.batch import FrameTensors
+from lidaraccum.model.convolution import Convolution
 from lidaraccum.model.kabsch import exactly, fit_rigid, invert, move
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.model.sinkhorn import sinkhorn
@@ -18,9 +19,6 @@ SHARPEST = 0.02
 _LEAST_REACH_M = 1.0
 STANDING_M = 0.3
 """Pillars whose points lie this high above ground, on average, stand out of it."""
-STANDING_ODDS = 16.0
-"""How much rather such a pillar is chosen: the road looks alike everywhere and says only its
-height, but there is far more of it."""
 
 
 _Kind = TypeVar("_Kind", bound="_Rows")
@@ -102,8 +100,8 @@ class EgoHead(nn.Module):
     def __init__(self, settings: NetworkSettings) -> None:
         super().__init__()
         channels = settings.ego_channels
-        self.inner = nn.Conv2d(settings.base_widths[0], channels, 3)
-        self.outer = nn.Conv2d(channels, channels, 3)
+        self.inner = Convolution(settings.base_widths[0], channels, 3)
+        self.outer = Convolution(channels, channels, 3)
 
     def forward(self, base: torch.Tensor, frame: torch.Tensor, cell: torch.Tensor) -> torch.Tensor:
         """Unit vectors (K, E) at K cells of base maps (F, C, S, S); frame and cell are (K,)."""
@@ -125,7 +123,7 @@ def _patches(base: torch.Tensor, frame: torch.Tensor, cell: torch.Tensor) -> tor
 
 
 def choose_background(
-    frames: FrameTensors, foreground: torch.Tensor, count: int, seed: int
+    frames: FrameTensors, foreground: torch.Tensor, count: int, seed: int, standing_odds: float
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Draw pillars of each frame, background first: indices and validity (F, count).
 
@@ -135,11 +133,12 @@ def choose_background(
         count: Pillars a frame.
         seed: Another one, another choice. The choice depends on the frame's own points and on
             nothing else: not on their order, nor on the frame's company.
+        standing_odds: How much rather than others pillars are drawn that stand out of the ground.
     """
     owner = frames.pillar_frame
     points = torch.tensor(frames.point_counts, device=owner.device)
     key = _hash(frames.pillar_cell + 65536 * 7 * points[owner] + 1_000_003 * seed)
-    odds = torch.where(frames.pillar_height > STANDING_M, STANDING_ODDS, 1.0)
+    odds = torch.where(frames.pillar_height > STANDING_M, standing_odds, 1.0)
     key = key ** (1.0 / odds)  # drawn by odds without putting back (Efraimidis and Spirakis, 2006)
     key = (1.0 - key) + (foreground > 0) + 2.0 * owner  # background below 1, foreground above
     order = torch.argsort(key)

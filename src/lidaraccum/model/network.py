@@ -196,8 +196,8 @@ class Network(nn.Module):
     def _ego(
         self, frames: FrameTensors, base: torch.Tensor, foreground: torch.Tensor, choice: int
     ) -> EgoPillars:
-        count = self.settings.ego_pillars
-        index, valid = choose_background(frames, foreground, count, choice)
+        count, odds = self.settings.ego_pillars, self.settings.standing_odds
+        index, valid = choose_background(frames, foreground, count, choice, odds)
         owner = torch.arange(len(frames), device=index.device)[:, None].expand_as(index)
         cell = frames.pillar_cell[index]
         feature = self.ego_head(base, owner.reshape(-1), cell.reshape(-1)).view(*index.shape, -1)

@@ -10,6 +10,7 @@ import torch
 
 _BFLOAT16_FLAGS = ("avx512_bf16", "amx_bf16")
 _BYTE_FLAGS = ("avx512_vnni", "avx_vnni")
+_WIDE_FLAG = "avx512f"
 
 
 def inference(device: torch.device | str = "cpu") -> AbstractContextManager[object]:
@@ -32,6 +33,11 @@ def has_bfloat16(device: torch.device | str) -> bool:
 def has_byte_units() -> bool:
     """Whether the processor multiplies bytes faster than float32."""
     return not _cpu_flags().isdisjoint(_BYTE_FLAGS)
+
+
+def has_wide_units() -> bool:
+    """Whether the processor works on sixteen floats at once."""
+    return _WIDE_FLAG in _cpu_flags()
 
 
 @cache

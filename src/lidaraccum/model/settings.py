@@ -30,6 +30,8 @@ class NetworkSettings:
             the first is that of the base features.
         ego_channels: Channels of the ego features.
         ego_pillars: Background pillars matched in each frame.
+        standing_odds: How much rather than the road, which looks alike everywhere but of which
+            there is far more, a pillar that stands out of it is drawn to be matched.
         slack_start: Where the slack of the pillars' affinity starts, before softplus.
         scale_start: Where its temperature starts, as a logarithm: lower is sharper. Fresh features,
             a good deal apart for any two places, must match a little (else there is no gradient)
@@ -57,6 +59,7 @@ class NetworkSettings:
     base_widths: tuple[int, ...] = (32, 64, 128, 192, 256)
     ego_channels: int = 64
     ego_pillars: int = 1024
+    standing_odds: float = 16.0
     slack_start: float = -1.0
     scale_start: float = -3.0
     sinkhorn_rounds: int = 3
@@ -78,6 +81,8 @@ class NetworkSettings:
             raise SettingsError("a U-Net has 2 to 5 levels (base), 2 to 4 (motion)")
         if self.temporal not in ("max", "decay"):
             raise SettingsError(f"temporal is max or decay, not {self.temporal!r}")
+        if self.standing_odds <= 0.0:
+            raise SettingsError("standing_odds is more than 0")
         if self.lowest_m >= self.highest_m:
             raise SettingsError("lowest_m must be below highest_m")
         self.cells(self.extent_m)

@@ -9,6 +9,8 @@ from functools import reduce
 import torch
 from torch import nn
 
+from lidaraccum.model.convolution import Convolution
+
 MOMENTS = 4
 _HARDLY_TAKEN = 0.1
 _TYPICAL_S = 0.4
@@ -20,7 +22,7 @@ class TemporalBlock(nn.Module):
 
     def __init__(self, channels: int) -> None:
         super().__init__()
-        self.space = nn.Conv2d(channels, channels, 3, padding=1)
+        self.space = Convolution(channels, channels, 3, padding=1)
         self.time = nn.Conv2d(3 * channels, channels, 1)
 
     def forward(self, stack: Sequence[torch.Tensor]) -> list[torch.Tensor]:

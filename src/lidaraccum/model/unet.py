@@ -8,13 +8,15 @@ from typing import cast
 import torch
 from torch import nn
 
+from lidaraccum.model.convolution import Convolution
+
 FAINT = 0.01
 """Variance below which a cell is empty rather than faint, and is not blown up."""
 
 
-def convolution(inputs: int, outputs: int, stride: int = 1) -> nn.Conv2d:
+def convolution(inputs: int, outputs: int, stride: int = 1) -> Convolution:
     """A 3 x 3 convolution that keeps the size (or halves it), started for a ReLU after it."""
-    layer = nn.Conv2d(inputs, outputs, 3, stride=stride, padding=1)
+    layer = Convolution(inputs, outputs, 3, stride=stride, padding=1)
     nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
     nn.init.constant_(cast("torch.Tensor", layer.bias), 0.0)
     return layer

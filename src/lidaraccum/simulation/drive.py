@@ -46,7 +46,12 @@ class SimulatedSequence:
         reach = (self.drawn.speed_mps + 2.0) * duration
         network = lay_network(self.drawn.scene, reach, child(rng))
         self.world: World = build_world(
-            network, reach, child(rng), rare=settings.rare, green=settings.green
+            network,
+            reach,
+            child(rng),
+            rare=settings.rare,
+            green=settings.green,
+            furniture=settings.furniture,
         )
         self.ego = self._drive(duration, child(rng))
         self.actors: tuple[Actor, ...] = Traffic(self.world, self.ego, child(rng)).populate()

@@ -258,3 +258,6 @@ CAR_SIZED: tuple[Callable[[np.random.Generator], Mesh], ...] = (
     bush, stairs, swings, billboard, clutter, clutter, goods, container,
 )  # fmt: skip
 """Things of about a car's size, which are not cars."""
+
+FURNITURE = frozenset({*KERB_SIDE, *CAR_SIZED} - {bush})
+"""What is neither built, grown nor movable."""

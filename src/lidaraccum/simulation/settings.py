@@ -39,6 +39,7 @@ class DriveSettings:
             but cars and people on foot) are so many times as likely as usual where one is drawn.
         green: So many times as much as drawn stands about properties (what grows from the ground,
             lines across, cars near it), up to the most that is ever drawn; nothing at 0.
+        furniture: Whether signs, bins, kiosks, containers, statues and the like stand about.
         exact: Without noise, losses, mixed edges or weather; for tests of laws.
     """
 
@@ -56,6 +57,7 @@ class DriveSettings:
     zeros: bool | None = None
     rare: float = 1.0
     green: float = 1.0
+    furniture: bool = True
     exact: bool = False
 
     def __post_init__(self) -> None:

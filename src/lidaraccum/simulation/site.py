@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lidaraccum.simulation.barriers import BARRIERS
 from lidaraccum.simulation.buildings import draw_building
 from lidaraccum.simulation.catalogue import Catalogue
-from lidaraccum.simulation.furniture import CAR_SIZED
+from lidaraccum.simulation.furniture import CAR_SIZED, FURNITURE
 from lidaraccum.simulation.mesh import Mesh
 from lidaraccum.simulation.models import Model
 from lidaraccum.simulation.plot import Plot
@@ -67,11 +67,13 @@ class Site:
     Args:
         plot: What is built on.
         catalogue: What can be parked.
+        furniture: Whether `FURNITURE` is put anywhere.
     """
 
-    def __init__(self, plot: Plot, catalogue: Catalogue) -> None:
+    def __init__(self, plot: Plot, catalogue: Catalogue, *, furniture: bool = True) -> None:
         self.plot = plot
         self.catalogue = catalogue
+        self.furniture = furniture
         self.rng = plot.rng
         self.crowd = float(self.rng.beta(2, 2))
         self._pools: dict[Maker, list[Mesh]] = {}
@@ -90,6 +92,11 @@ class Site:
 
         return take
 
+    def stand(self, maker: Maker, places: Array, yaws: Array, margin: float) -> None:
+        """One of a kind at each place (N, 2) that is free, ``margin`` from the carriageway."""
+        if self.furniture or maker not in FURNITURE:
+            self.plot.scatter(self.some(maker), places, yaws, margin)
+
     def scatter(
         self, maker: Callable[[np.random.Generator], Mesh], block: Block, count: int, near: float,
         far: float, *, along_street: bool = False,
@@ -106,7 +113,7 @@ class Site:
             if along_street
             else rng.uniform(0, 6.28, count)
         )
-        self.plot.scatter(self.some(maker), places, heading + turn, 0.35)
+        self.stand(maker, places, heading + turn, 0.35)
 
     def car_sized(self, block: Block, count: int, near: float, far: float) -> None:
         """So many of the things that are as large as cars and are none."""

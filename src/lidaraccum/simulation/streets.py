@@ -95,7 +95,7 @@ def _pavement(site: Site, block: Block, style: str) -> None:
         gap = rng.uniform(5, 14)
         along = np.arange(rng.uniform(0, gap), block.length, gap)
         places, _ = block.at(along, at_kerb + 0.2)
-        site.plot.scatter(site.some(draw_tree), places, rng.uniform(0, 6.28, len(along)), 0.3)
+        site.stand(draw_tree, places, rng.uniform(0, 6.28, len(along)), 0.3)
     if block.road.speed_mps > 18:
         return
     busy = style in ("terrace", "park", "carpark") and walk > 1.5

@@ -217,4 +217,4 @@ def _scatter(
     quarter = 0.5 * np.pi * rng.integers(4, size=count)
     turn = quarter if along_street else rng.uniform(0, 2 * np.pi, count)
     room = site.plot.are_free(places, LEAST_ROOM_M)
-    site.plot.scatter(site.some(maker), places[room], (heading + turn)[room], 0.35)
+    site.stand(maker, places[room], (heading + turn)[room], 0.35)

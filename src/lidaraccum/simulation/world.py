@@ -52,6 +52,7 @@ def build_world(
     *,
     rare: float = 1.0,
     green: float = 1.0,
+    furniture: bool = True,
 ) -> World:
     """The world about the ego's way.
 
@@ -61,18 +62,19 @@ def build_world(
         rng: What is drawn comes from here.
         rare: How many times as likely as usual rare movable kinds are.
         green: How many times as much as usual grows about properties.
+        furniture: Whether things stand about that are neither built, grown nor movable.
     """
     growing = rng.spawn(1)[0]
     along = network.ego_start + np.linspace(0, max(reach_m, 1.0), 12)
     terrain = shape_terrain(network, network.ego.at(along)[0], rng)
     plot, catalogue = Plot(network, terrain, rng), Catalogue(rng, rare)
     build_overhead(plot, network.kind, network.ego_start)
-    site = Site(plot, catalogue)
+    site = Site(plot, catalogue, furniture=furniture)
     _fill_squares(plot, site)
     _plant_islands(plot, site)
     lined = [one for road in network.roads for one in line_road(site, road, network.kind)]
     plot.rng = growing
-    garden = Site(plot, catalogue.drawing_from(growing))
+    garden = Site(plot, catalogue.drawing_from(growing), furniture=furniture)
     overgrow(garden, lined, network.ego.at(along)[0], green)
     ground = [ground_mesh(terrain, network, rng), kerb_mesh(terrain, network, rng)]
     background = merge([*ground, *plot.parts])
@@ -93,7 +95,7 @@ def _fill_squares(plot: Plot, site: Site) -> None:
         makers = (*CAR_SIZED, *KERB_SIDE, draw_tree, draw_tree, draw_tree)
         for place in places:
             maker = makers[int(rng.integers(len(makers)))]
-            plot.scatter(site.some(maker), place[None], rng.uniform(0, 6.28, 1), 0.8)
+            site.stand(maker, place[None], rng.uniform(0, 6.28, 1), 0.8)
         chances = {"pedestrian": 8.0, "bicycle": 3, "car": 2, "van": 1, "oddity": 1.5, "pram": 1}
         for place in np.array([x, y]) + rng.uniform(-0.8, 0.8, (rng.poisson(8), 2)) * radius:
             if plot.off_road(place[None], 2.5)[0]:
@@ -108,4 +110,4 @@ def _plant_islands(plot: Plot, site: Site) -> None:
             angle, out = rng.uniform(0, 2 * np.pi), rng.uniform(0, 0.7) * radius
             place = np.array([x + out * np.cos(angle), y + out * np.sin(angle)])
             maker = (draw_tree, CAR_SIZED[int(rng.integers(len(CAR_SIZED)))])[int(rng.integers(2))]
-            plot.scatter(site.some(maker), place[None], rng.uniform(0, 6.28, 1), 0.5)
+            site.stand(maker, place[None], rng.uniform(0, 6.28, 1), 0.5)

@@ -35,6 +35,7 @@ class WindowSettings:
         rare: In every other simulated drive what is movable but no car nor on foot is so many times
             as likely as usual: a lorry that is met once in a hundred windows is not learned.
         green: Simulated gardens have so many times as much growth as is drawn; none at 0.
+        furniture: Whether signs, bins, kiosks and the like stand about in simulated drives.
         rolling_shutter: Whether simulated sweeps take their time; drawn when None.
         exact: Simulated points without noise, losses, mixed edges or weather.
         augment: How windows are changed.
@@ -49,6 +50,7 @@ class WindowSettings:
     sensors: tuple[str, ...] = ()
     rare: float = 1.0
     green: float = 1.0
+    furniture: bool = True
     rolling_shutter: bool | None = None
     exact: bool = False
     augment: AugmentSettings = field(default_factory=AugmentSettings)

@@ -71,6 +71,7 @@ class SimulatedDrives:
             training_settings(number, mine.drive_frames),
             compensated=True,
             green=mine.green,
+            furniture=mine.furniture,
             rolling_shutter=mine.rolling_shutter,
             exact=mine.exact,
         )

@@ -21,8 +21,6 @@ from lidaraccum.training.losses import (
 )
 from lidaraccum.training.window import Batch, Truth
 
-OFFSET_WEIGHT = 0.5
-OBJECT_WEIGHT = 0.3
 Poses = Literal["true", "noisy", "own"]
 
 
@@ -38,6 +36,9 @@ class ObjectiveSettings:
         detach_motion: Keep the motion branch's gradient out of the base features.
         most_points: Points looked at closely in one window; more are thinned by lot.
         clusters: How wrong the objects are that TubeNet gets.
+        ego_weight: Of the ego-motion's term; foreground and motion count once each.
+        offset_weight: Of the offsets' term.
+        object_weight: Of the objects' motions' term.
     """
 
     poses: Poses = "noisy"
@@ -46,10 +47,15 @@ class ObjectiveSettings:
     detach_motion: bool = False
     most_points: int = 16384
     clusters: ClusterSettings = field(default_factory=ClusterSettings)
+    ego_weight: float = 1.0
+    offset_weight: float = 0.5
+    object_weight: float = 0.3
 
     def __post_init__(self) -> None:
         if self.poses not in ("true", "noisy", "own"):
             raise SettingsError(f"poses are true, noisy or own, not {self.poses!r}")
+        if min(self.ego_weight, self.offset_weight, self.object_weight) < 0.0:
+            raise SettingsError("weights of the loss's terms are 0 or more")
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +109,8 @@ def objective(
     aligned_from_object = object_poses(batch, poses)
     offset = _offset_loss(perception, truth, aligned_from_object)
     objects = _object_loss(network, perception, truth, aligned_from_object, settings, generator)
-    total = ego + foreground + motion + OFFSET_WEIGHT * offset + OBJECT_WEIGHT * objects
+    total = settings.ego_weight * ego + foreground + motion
+    total = total + settings.offset_weight * offset + settings.object_weight * objects
     return Losses(total, ego, foreground, motion, offset, objects)
 
 
