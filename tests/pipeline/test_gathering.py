@@ -38,6 +38,10 @@ class Passing:
     def world(self, picked: np.ndarray) -> np.ndarray:
         return self.points[picked]
 
+    @property
+    def heights(self) -> np.ndarray:
+        return np.asarray(self.points[:, 2])
+
 
 VELOCITY = np.array([6.0, 2.0, 0.0])
 
@@ -52,7 +56,7 @@ def passing(turn: float, widths: tuple[float, float], shares: tuple[float, float
     for index in range(4):
         stamp = 0.1 * index
         ahead = turned(VELOCITY, turn * stamp)
-        ahead /= np.linalg.norm(ahead)
+        ahead = ahead / np.linalg.norm(ahead)
         left = np.array([-ahead[1], ahead[0], 0.0])
         body = rng.uniform(-widths[0], widths[0], 400)
         beyond = rng.uniform(widths[1], widths[1] + 3.0, 300)
@@ -143,6 +147,41 @@ def test_a_bus_is_as_long_as_all_frames_together_tell(turn: float) -> None:
         mine = filled[frame.index]
         assert len(mine) > 0.93 * 400  # the outermost is its, where it was picked
         assert (mine < 400).all()
+
+
+ROOF_M = 4.5
+"""What is higher stands in `Tunnel`."""
+
+
+class Tunnel(Blinkered):
+    """Its frames meet the roof wherever they look for it, and see past where the bus was."""
+
+    def look(self, points: np.ndarray, sensor_from_world: None) -> SimpleNamespace:
+        roof = points[:, 2] > ROOF_M
+        return SimpleNamespace(through=~roof, met=roof)
+
+
+def test_the_roof_of_a_tunnel_above_a_bus_stays_and_does_not_keep_it_from_being_whole() -> None:
+    rng = np.random.default_rng(4)
+    frames, picked = [], {}
+    for index in range(3):
+        along, aside = rng.uniform(-9, 9, 2000), rng.uniform(-1.2, 1.2, 2000)
+        high = np.where(np.arange(2000) < 1400, rng.uniform(0.3, 3.6, 2000), ROOF_M + 0.1)
+        ahead = VELOCITY / np.linalg.norm(VELOCITY)
+        left = np.array([-ahead[1], ahead[0], 0.0])
+        points = way(VELOCITY, 0.0, 0.1 * index) + along[:, None] * ahead + aside[:, None] * left
+        points[:, 2] = high
+        nothing = np.zeros(2000, dtype=int)
+        frames.append(Tunnel(index, 0.1 * index, points, nothing, nothing))
+        # Its ends, and a little of the roof that was taken along.
+        ends = np.abs(along) > 8.0
+        picked[index] = np.flatnonzero(ends & ((high < ROOF_M) | (rng.random(2000) < 0.2)))
+    taken_along = sum(int((mine >= 1400).sum()) for mine in picked.values())
+    course = np.zeros(3), 0.0, 0.0
+    filled = with_middle(picked, VELOCITY, frames, *course)  # type: ignore[arg-type]
+    for mine in filled.values():
+        assert (mine < 1400).sum() > 0.99 * 1400
+    assert sum(int((mine >= 1400).sum()) for mine in filled.values()) == taken_along
 
 
 def test_a_mover_of_which_nothing_is_left_is_no_trouble() -> None:

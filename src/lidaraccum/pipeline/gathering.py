@@ -54,6 +54,10 @@ AS_ACCUSED = 0.98
 seen through most, up to the last share, that is something else which was seen through less than
 the second share as often: a hedge that the mover passes."""
 
+STRIP_M = 0.5
+STRIPS = 1000
+"""What lies along a mover's way is told apart in strips so wide and high, fewer than so many."""
+
 SKEW_RAD = np.deg2rad(np.arange(-35, 36, 5))
 ENDS = (0.01, 0.99)
 """A vehicle in a bend lies askew to its way, by one of these. Its width lies between these
@@ -310,7 +314,8 @@ def with_middle(
 
     A long side that slides along itself is seen through at its ends only, and in some frames at one
     of them: it is as long as all frames together tell. What stands is seen there when the mover is
-    elsewhere. Nothing is added that has ``most_growth`` times its points.
+    elsewhere: so are the walls and the roof of a tunnel, strip by strip, where its ends pass by.
+    Nothing is added that has ``most_growth`` times its points.
     """
     filled = dict(picked)
     shown, courses, places = _along(picked, velocity, frames, centre, stamp, turn)
@@ -321,24 +326,35 @@ def with_middle(
         frame.index: _Box(one, np.minimum(low, own.min(axis=0)), np.maximum(high, own.max(axis=0)))
         for frame, one, own in zip(shown, courses, places, strict=True)
     }
-    for frame in shown:
-        mine = picked[frame.index]
-        near = _others_of_clusters(frame, mine)
+    between = [_between(frame, picked[frame.index], boxes[frame.index]) for frame in shown]
+    strips, part = np.unique(np.concatenate([strip for _, strip in between]), return_inverse=True)
+    parts = np.split(part, np.cumsum([len(near) for near, _ in between])[:-1])
+    balance = np.zeros(len(strips), dtype=np.int64)
+    for frame, (near, _), own in zip(shown, between, parts, strict=True):
         world = frame.world(near)
-        inside = boxes[frame.index].holds(world, 0.0)
-        near, world = near[inside], world[inside]
-        if not 0 < len(near) < most_growth * len(mine):
-            continue
-        balance = 0
         for other in shown:
-            if other is not frame:
-                left = world[~boxes[other.index].holds(world, BOX_MARGIN_M)]
-                if len(left):
-                    seen = other.view.look(left, other.sensor_from_world)
-                    balance += int(seen.through.sum()) - int(seen.met.sum())
-        if balance >= 0:
-            filled[frame.index] = np.union1d(mine, near)
+            left = np.flatnonzero(~boxes[other.index].holds(world, BOX_MARGIN_M))
+            if other is not frame and len(left):
+                seen = other.view.look(world[left], other.sensor_from_world)
+                np.add.at(balance, own[left], seen.through.astype(int) - seen.met.astype(int))
+    for frame, (near, _), own in zip(shown, between, parts, strict=True):
+        mine, more = picked[frame.index], near[balance[own] >= 0]
+        if len(more) < most_growth * len(mine):
+            filled[frame.index] = np.union1d(mine, more)
     return filled
+
+
+def _between(
+    frame: SightedFrame, picked: NDArray[np.int64], box: _Box
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Which obstacles (K,) of the picked ones' clusters are in a box, too, and in which strip."""
+    near = _others_of_clusters(frame, picked)
+    world = frame.world(near)
+    inside = box.holds(world, 0.0)
+    near, world = near[inside], world[inside]
+    aside, high = box.course.places(world)[:, 1], frame.heights[near]
+    cells = np.floor(np.stack([aside, high], axis=1) / STRIP_M).astype(np.int64)
+    return near, cells[:, 0] * STRIPS + cells[:, 1]
 
 
 def _others_of_clusters(frame: SightedFrame, picked: NDArray[np.int64]) -> NDArray[np.int64]:
