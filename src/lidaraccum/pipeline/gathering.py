@@ -281,6 +281,12 @@ def length_along(points: NDArray[np.float64], velocity: NDArray[np.float64]) -> 
     return float(np.ptp(points[:, :2] @ velocity[:2]) / np.linalg.norm(velocity))
 
 
+def width_across(points: NDArray[np.float64], velocity: NDArray[np.float64]) -> float:
+    """Metres from side to side of points (N, 3), world, that go with a velocity (3,), or askew."""
+    course = _Course.at(0.0, points.mean(axis=0), velocity, 0.0)
+    return _width(course.places(points))
+
+
 def seconds_at_place(length_m: float, velocity: NDArray[np.float64]) -> float:
     """How long a mover of such a length and velocity (3,) is at a place."""
     return (length_m + PASSING_M) / float(np.linalg.norm(velocity))

@@ -1,8 +1,8 @@
-"""Movers of one window that are parts of one thing, made one."""
+"""Movers of one window that are parts of one thing, made one and whole."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,10 +11,10 @@ from scipy.spatial import cKDTree
 
 from lidaraccum.pipeline.courses import are_alike
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.gathering import LONGEST_M, length_along
+from lidaraccum.pipeline.gathering import LONGEST_M, WIDEST_M, length_along, width_across
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.objects import TEMPLATE_POINTS, WindowObject
-from lidaraccum.pipeline.suspects import template_of
+from lidaraccum.pipeline.suspects import Lead, template_of
 from lidaraccum.pipeline.verdict import judge
 
 SAME_GAP_M = 0.8
@@ -27,6 +27,79 @@ NO_WORSE = 0.05
 """So are two whose velocities differ by less than this and this share of the speed, where one of
 the motions costs the other's points at most so much more than their own: the long side of a truck
 fits many velocities, its ends one."""
+
+
+WITHIN_SHARE = 0.7
+"""A mover with more than this share of its points in a proposer's outline is what that is of."""
+
+_NONE = np.zeros(0, dtype=np.int64)
+
+
+def complete(
+    movers: Sequence[WindowObject],
+    leads: Sequence[Lead],
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+) -> list[WindowObject]:
+    """Movers with all of what a proposer takes for the thing that they are the ends of.
+
+    The long side of a bus slides along itself: whatever motion is tried on all of it explains it
+    as well as standing still, and only its ends tell how it goes. What is added goes with them as
+    well as it stands, and is no other mover's.
+    """
+    completed = list(movers)
+    for lead in leads:
+        inside = [
+            place
+            for place, one in enumerate(completed)
+            if not one.unseen and _share_within(one, lead) > WITHIN_SHARE
+        ]
+        for place in sorted(inside, key=lambda place: -completed[place].size)[:1]:
+            rest = _rest(lead, completed, frames)
+            whole = _united(completed[place], replace(completed[place], picked=rest))
+            if rest and _is_one(completed[place], rest, whole, frames, settings):
+                completed[place] = whole
+    return completed
+
+
+def _share_within(one: WindowObject, lead: Lead) -> float:
+    """How much of a mover is what a proposer meant, in the frames that he looked at."""
+    own = [(mine, lead.picked[index]) for index, mine in one.picked.items() if index in lead.picked]
+    held = sum(int(np.isin(mine, meant).sum()) for mine, meant in own)
+    return held / max(sum(len(mine) for mine, _ in own), 1)
+
+
+def _rest(
+    lead: Lead, movers: Sequence[WindowObject], frames: Sequence[SightedFrame]
+) -> dict[int, NDArray[np.int64]]:
+    """By frame index: what a proposer meant that is no mover's (K,)."""
+    rest = {}
+    for frame in frames:
+        taken = np.concatenate([_NONE, *(one.of(frame) for one in movers)])
+        free = np.setdiff1d(lead.picked.get(frame.index, _NONE), taken)
+        if len(free):
+            rest[frame.index] = free
+    return rest
+
+
+def _is_one(
+    part: WindowObject,
+    rest: Mapping[int, NDArray[np.int64]],
+    whole: WindowObject,
+    frames: Sequence[SightedFrame],
+    settings: MotionSettings,
+) -> bool:
+    """Whether the rest goes as its part does as well as it stands, and all is vehicle-sized."""
+    own = max(frames, key=lambda frame: len(rest.get(frame.index, _NONE)))
+    for frame in frames:
+        if len(whole.of(frame)):
+            points, ahead = frame.world(whole.of(frame)), part.velocity_at(frame.stamp)
+            if length_along(points, ahead) > LONGEST_M or width_across(points, ahead) > WIDEST_M:
+                return False
+    template = template_of(own, rest[own.index], TEMPLATE_POINTS)
+    rivals = np.stack([np.zeros(3), part.velocity_at(own.stamp)])
+    cost = judge(template, rivals, frames, settings, np.array([0.0, part.turn])).cost
+    return bool(cost[1] < cost[0] + NO_WORSE)
 
 
 def join_parts(

@@ -14,7 +14,7 @@ from lidaraccum.pipeline.courses import are_alike, way
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.gathering import WHOLE_GROWTH, with_middle
 from lidaraccum.pipeline.hypotheses import propose
-from lidaraccum.pipeline.joining import join_parts
+from lidaraccum.pipeline.joining import complete, join_parts
 from lidaraccum.pipeline.motion_settings import LIKELY, MotionSettings
 from lidaraccum.pipeline.objects import Expectation, FirstLook, WindowObject, explain, look_at
 from lidaraccum.pipeline.suspects import (
@@ -94,7 +94,9 @@ def find_objects(
                 is_sure = found.margin > settings.sure_margin and not found.unseen
                 meant = (_outlined if is_sure else _meant)(found, lead, frames)
                 movers = _settle([meant], movers, frames, settings, SURE_SHARE)
-    return [_filled(one, frames) for one in join_parts(movers, frames, settings)]
+    sure = [lead for lead, _ in looked if lead.trust >= LIKELY]
+    whole = complete(join_parts(movers, frames, settings), sure, frames, settings)
+    return [_filled(one, frames) for one in whole]
 
 
 def _filled(one: WindowObject, frames: Sequence[SightedFrame]) -> WindowObject:
