@@ -174,7 +174,12 @@ class Network(nn.Module):
         self.tube_net = TubeNet(settings)
 
     def encode(
-        self, frames: FrameTensors, choice: int = 0, *, matchable: bool = True
+        self,
+        frames: FrameTensors,
+        choice: int = 0,
+        *,
+        matchable: bool = True,
+        masked: bool = True,
     ) -> FrameFeatures:
         """Features of F frames, each by itself.
 
@@ -182,13 +187,15 @@ class Network(nn.Module):
             frames: From `batch.to_tensors`.
             choice: Another number draws other background pillars (training).
             matchable: Whether somebody is to match them; else no background pillars are drawn.
+            masked: Whether what may move is left out of those; else pillars are drawn of all.
         """
         base = self.backbone(self.pillars(frames))
         narrow, rectify, last = self.foreground_head
         scores = to_one_channel(cast("nn.Conv2d", last), rectify(narrow(base))).float()
         foreground = scores.reshape(-1).index_select(0, frames.pillar_place)
         if matchable:
-            ego = self._ego(frames, base, foreground.detach(), choice)
+            odds = foreground.detach() if masked else torch.full_like(foreground, -torch.inf)
+            ego = self._ego(frames, base, odds, choice)
         else:
             ego = EgoPillars.none(frames.level_from_sensor, self.settings.ego_channels)
         return FrameFeatures(frames, base.split(1), foreground, ego)

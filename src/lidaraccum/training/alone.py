@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Set
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -40,14 +41,24 @@ class Answer:
 
 
 def answer_alone(
-    network: Network, features: FrameFeatures, windows: Windows, target_from_source: torch.Tensor
+    network: Network,
+    features: FrameFeatures,
+    windows: Windows,
+    target_from_source: torch.Tensor,
+    without: Set[str] = frozenset(),
 ) -> Answer:
-    """What the network says of one window, with its own poses of the source frames."""
+    """What the network says of one window, with its own poses of the source frames.
+
+    ``without`` some of ``motion`` (what may move goes as its object does, even where it seems to
+    stand) and ``offsets`` (objects are what lies together), it says what the paper's ablations do.
+    """
     frames, target = features.frames, windows.target[0]
     poses = own_poses(windows, target_from_source)
     seen = network.perceive(features, poses, windows, most=MOST_POINTS)
     movable = seen.foreground > 0
-    moving = movable & (seen.dynamic > 0)
+    moving = movable if "motion" in without else movable & (seen.dynamic > 0)
+    if "offsets" in without:
+        seen = replace(seen, offset=torch.zeros_like(seen.offset))
     ids = torch.zeros_like(seen.point)
     ids[movable] = _clusters(seen, movable).to(ids.device)
     level = chain(frames.level_from_sensor[target], poses, invert(frames.level_from_sensor))
