@@ -15,6 +15,7 @@ from lidaraccum.pipeline.gathering import (
     with_middle,
     without_flanks,
     without_strays,
+    without_walls,
 )
 
 
@@ -149,39 +150,81 @@ def test_a_bus_is_as_long_as_all_frames_together_tell(turn: float) -> None:
         assert (mine < 400).all()
 
 
-ROOF_M = 4.5
-"""What is higher stands in `Tunnel`."""
+ROOF_M, WALL_M = 4.5, 1.6
+"""What is higher stands in `Tunnel`, and what is farther to the left of the way."""
 
 
 class Tunnel(Blinkered):
-    """Its frames meet the roof wherever they look for it, and see past where the bus was."""
+    """Its frames meet the roof and the wall wherever they look for them, and see past all else."""
 
     def look(self, points: np.ndarray, sensor_from_world: None) -> SimpleNamespace:
-        roof = points[:, 2] > ROOF_M
-        return SimpleNamespace(through=~roof, met=roof)
+        stands = (points[:, 2] > ROOF_M) | (points @ LEFT > WALL_M)
+        return SimpleNamespace(through=~stands, met=stands)
+
+
+AHEAD = VELOCITY / np.linalg.norm(VELOCITY)
+LEFT = np.array([-AHEAD[1], AHEAD[0], 0.0])
+
+
+def tunnel() -> list[Tunnel]:
+    """1400 points of a bus, of which the ends were seen through, 600 of the roof, 600 of a wall."""
+    rng = np.random.default_rng(4)
+    frames = []
+    for index in range(5):
+        along, aside = rng.uniform(-9, 9, 2600), rng.uniform(-1.2, 1.2, 2600)
+        high = rng.uniform(0.3, 3.6, 2600)
+        high[1400:2000], aside[2000:] = ROOF_M + 0.1, WALL_M + 0.1
+        points = along[:, None] * AHEAD + aside[:, None] * LEFT
+        points += way(VELOCITY, 0.0, 0.1 * index)  # more and more of roof and wall is in view
+        points[:, 2] = high
+        through = ((np.abs(along) > 8.5) & (np.arange(2600) < 1400)).astype(int)
+        frames.append(Tunnel(index, 0.1 * index, points, through, 1 - through))
+    return frames
+
+
+COURSE = np.zeros(3), 0.0, 0.0
 
 
 def test_the_roof_of_a_tunnel_above_a_bus_stays_and_does_not_keep_it_from_being_whole() -> None:
-    rng = np.random.default_rng(4)
-    frames, picked = [], {}
-    for index in range(3):
-        along, aside = rng.uniform(-9, 9, 2000), rng.uniform(-1.2, 1.2, 2000)
-        high = np.where(np.arange(2000) < 1400, rng.uniform(0.3, 3.6, 2000), ROOF_M + 0.1)
-        ahead = VELOCITY / np.linalg.norm(VELOCITY)
-        left = np.array([-ahead[1], ahead[0], 0.0])
-        points = way(VELOCITY, 0.0, 0.1 * index) + along[:, None] * ahead + aside[:, None] * left
-        points[:, 2] = high
-        nothing = np.zeros(2000, dtype=int)
-        frames.append(Tunnel(index, 0.1 * index, points, nothing, nothing))
-        # Its ends, and a little of the roof that was taken along.
-        ends = np.abs(along) > 8.0
-        picked[index] = np.flatnonzero(ends & ((high < ROOF_M) | (rng.random(2000) < 0.2)))
+    frames, picked = tunnel(), {}
+    for frame in frames:  # its ends, and a little of the roof that was taken along
+        along = (frame.points - way(VELOCITY, 0.0, frame.stamp)) @ AHEAD
+        number = np.arange(2600)
+        roof = (number >= 1400) & (number < 2000) & (number % 5 == 0)
+        picked[frame.index] = np.flatnonzero((np.abs(along) > 8.0) & ((number < 1400) | roof))
     taken_along = sum(int((mine >= 1400).sum()) for mine in picked.values())
-    course = np.zeros(3), 0.0, 0.0
-    filled = with_middle(picked, VELOCITY, frames, *course)  # type: ignore[arg-type]
+    filled = with_middle(picked, VELOCITY, frames, *COURSE)  # type: ignore[arg-type]
     for mine in filled.values():
         assert (mine < 1400).sum() > 0.99 * 1400
     assert sum(int((mine >= 1400).sum()) for mine in filled.values()) == taken_along
+
+
+def test_a_tunnels_wall_and_roof_that_slide_along_with_a_bus_stay() -> None:
+    frames = tunnel()
+    picked = {frame.index: np.arange(2600) for frame in frames}
+    kept = without_walls(picked, VELOCITY, frames, *COURSE)  # type: ignore[arg-type]
+    for mine in kept.values():
+        assert (mine < 1400).sum() == 1400
+        assert (mine >= 1400).sum() < 30
+
+
+class Queue(Tunnel):
+    """Its frames meet the next vehicle wherever the bus is not."""
+
+    def look(self, points: np.ndarray, sensor_from_world: None) -> SimpleNamespace:
+        met = np.ones(len(points), dtype=np.bool_)
+        return SimpleNamespace(through=~met, met=met)
+
+
+def test_what_follows_a_bus_closely_takes_nothing_from_it() -> None:
+    """Its place is met when it has gone, but its own ends are seen through at every height."""
+    frames = [
+        Queue(one.index, one.stamp, one.points[:1400], one.through[:1400], one.met[:1400])
+        for one in tunnel()
+    ]
+    picked = {frame.index: np.arange(1400) for frame in frames}
+    kept = without_walls(picked, VELOCITY, frames, *COURSE)  # type: ignore[arg-type]
+    assert all(len(mine) == 1400 for mine in kept.values())
 
 
 def test_a_mover_of_which_nothing_is_left_is_no_trouble() -> None:
@@ -189,6 +232,7 @@ def test_a_mover_of_which_nothing_is_left_is_no_trouble() -> None:
     course = VELOCITY, frames, np.zeros(3), 0.0, 0.0
     assert without_flanks({}, *course) == {}  # type: ignore[arg-type]
     assert with_middle({}, *course) == {}  # type: ignore[arg-type]
+    assert without_walls({}, *course) == {}  # type: ignore[arg-type]
 
 
 def test_few_points_far_from_the_others_are_not_a_movers() -> None:

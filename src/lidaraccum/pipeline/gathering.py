@@ -58,6 +58,12 @@ STRIP_M = 0.5
 STRIPS = 1000
 """What lies along a mover's way is told apart in strips so wide and high, fewer than so many."""
 
+WALL_LOOKS = 10
+WALL_SHARE = 0.1
+WALL_ACCUSED = 0.02
+"""A strip stands that so many looks met when the mover was elsewhere, less than this share as many
+went through, and of whose points less than the last share was seen through by more than met it."""
+
 SKEW_RAD = np.deg2rad(np.arange(-35, 36, 5))
 ENDS = (0.01, 0.99)
 """A vehicle in a bend lies askew to its way, by one of these. Its width lies between these
@@ -327,40 +333,108 @@ def with_middle(
     shown, courses, places = _along(picked, velocity, frames, centre, stamp, turn)
     if not shown:
         return filled
-    low, high = np.quantile(np.concatenate(places), WHOLE_QUANTILES, axis=0)
-    boxes = {
-        frame.index: _Box(one, np.minimum(low, own.min(axis=0)), np.maximum(high, own.max(axis=0)))
-        for frame, one, own in zip(shown, courses, places, strict=True)
-    }
-    between = [_between(frame, picked[frame.index], boxes[frame.index]) for frame in shown]
-    strips, part = np.unique(np.concatenate([strip for _, strip in between]), return_inverse=True)
-    parts = np.split(part, np.cumsum([len(near) for near, _ in between])[:-1])
-    balance = np.zeros(len(strips), dtype=np.int64)
-    for frame, (near, _), own in zip(shown, between, parts, strict=True):
-        world = frame.world(near)
-        for other in shown:
-            left = np.flatnonzero(~boxes[other.index].holds(world, BOX_MARGIN_M))
-            if other is not frame and len(left):
-                seen = other.view.look(world[left], other.sensor_from_world)
-                np.add.at(balance, own[left], seen.through.astype(int) - seen.met.astype(int))
-    for frame, (near, _), own in zip(shown, between, parts, strict=True):
-        mine, more = picked[frame.index], near[balance[own] >= 0]
+    boxes = _boxes(courses, places)
+    between = [
+        _between(frame, picked[frame.index], box) for frame, box in zip(shown, boxes, strict=True)
+    ]
+    strips = _Strips.of(between, shown, boxes)
+    for frame, near, own in zip(shown, between, strips.parts, strict=True):
+        mine, more = picked[frame.index], near[(strips.through >= strips.met)[own]]
         if len(more) < most_growth * len(mine):
             filled[frame.index] = np.union1d(mine, more)
     return filled
 
 
-def _between(
-    frame: SightedFrame, picked: NDArray[np.int64], box: _Box
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Which obstacles (K,) of the picked ones' clusters are in a box, too, and in which strip."""
+def without_walls(
+    picked: Mapping[int, NDArray[np.int64]],
+    velocity: NDArray[np.float64],
+    frames: Sequence[SightedFrame],
+    centre: NDArray[np.float64],
+    stamp: float,
+    turn: float,
+) -> dict[int, NDArray[np.int64]]:
+    """A mover's points less what lies along its way and stays there when the mover is elsewhere.
+
+    The wall of a tunnel finds partners wherever it goes, as the side of a truck beside it does; but
+    the truck's ends are seen through, strip by strip, and of the wall nothing is.
+    """
+    shown, courses, places = _along(picked, velocity, frames, centre, stamp, turn)
+    if not shown:
+        return {}
+    own = [picked[frame.index] for frame in shown]
+    strips = _Strips.of(own, shown, _boxes(courses, places))
+    every = np.concatenate(strips.parts)
+    accused = np.concatenate(
+        [frame.through[mine] > frame.met[mine] for frame, mine in zip(shown, own, strict=True)]
+    )
+    count, blamed = (np.bincount(every, weight, len(strips.met)) for weight in (None, accused))
+    stands = (strips.met >= WALL_LOOKS) & (strips.through < WALL_SHARE * strips.met)
+    stands &= blamed < WALL_ACCUSED * count
+    if stands[every].all():
+        return dict(picked)
+    kept = [mine[~stands[part]] for mine, part in zip(own, strips.parts, strict=True)]
+    return {frame.index: mine for frame, mine in zip(shown, kept, strict=True) if len(mine)}
+
+
+def _boxes(courses: Sequence[_Course], places: Sequence[NDArray[np.float64]]) -> list[_Box]:
+    """Where a mover is in each frame, as large as its places (K, 2) of all frames together tell."""
+    low, high = np.quantile(np.concatenate(places), WHOLE_QUANTILES, axis=0)
+    return [
+        _Box(one, np.minimum(low, own.min(axis=0)), np.maximum(high, own.max(axis=0)))
+        for one, own in zip(courses, places, strict=True)
+    ]
+
+
+def _between(frame: SightedFrame, picked: NDArray[np.int64], box: _Box) -> NDArray[np.int64]:
+    """Which obstacles (K,) of the picked ones' clusters are in a box, too."""
     near = _others_of_clusters(frame, picked)
-    world = frame.world(near)
-    inside = box.holds(world, 0.0)
-    near, world = near[inside], world[inside]
-    aside, high = box.course.places(world)[:, 1], frame.heights[near]
-    cells = np.floor(np.stack([aside, high], axis=1) / STRIP_M).astype(np.int64)
-    return near, cells[:, 0] * STRIPS + cells[:, 1]
+    return near[box.holds(frame.world(near), 0.0)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Strips:
+    """Obstacles of some frames by strips along a mover's way, and what the frames say of them.
+
+    Attributes:
+        parts: (K,) int64 of each frame: which strip each of its obstacles is in.
+        through: (S,) looks through a strip's obstacles' places by frames in which the mover's box
+            is elsewhere.
+        met: (S,) such looks that met something.
+    """
+
+    parts: list[NDArray[np.int64]]
+    through: NDArray[np.int64]
+    met: NDArray[np.int64]
+
+    @classmethod
+    def of(
+        cls,
+        obstacles: Sequence[NDArray[np.int64]],
+        frames: Sequence[SightedFrame],
+        boxes: Sequence[_Box],
+    ) -> _Strips:
+        """Of obstacles (K,) of each frame, in which the mover is in a box."""
+        worlds = [frame.world(own) for frame, own in zip(frames, obstacles, strict=True)]
+        keys = [
+            _strip_keys(box.course.places(world)[:, 1], frame.heights[own])
+            for frame, own, world, box in zip(frames, obstacles, worlds, boxes, strict=True)
+        ]
+        strips, part = np.unique(np.concatenate(keys), return_inverse=True)
+        parts = np.split(part, np.cumsum([len(own) for own in obstacles])[:-1])
+        through, met = np.zeros((2, len(strips)), dtype=np.int64)
+        for frame, world, own in zip(frames, worlds, parts, strict=True):
+            for other, box in zip(frames, boxes, strict=True):
+                left = np.flatnonzero(~box.holds(world, BOX_MARGIN_M))
+                if other is not frame and len(left):
+                    seen = other.view.look(world[left], other.sensor_from_world)
+                    through += np.bincount(own[left], seen.through, len(strips)).astype(int)
+                    met += np.bincount(own[left], seen.met, len(strips)).astype(int)
+        return cls(parts, through, met)
+
+
+def _strip_keys(aside: NDArray[np.float64], heights: NDArray[np.float64]) -> NDArray[np.int64]:
+    cells = np.floor(np.stack([aside, heights], axis=1) / STRIP_M).astype(np.int64)
+    return np.asarray(cells[:, 0] * STRIPS + cells[:, 1])
 
 
 def _others_of_clusters(frame: SightedFrame, picked: NDArray[np.int64]) -> NDArray[np.int64]:

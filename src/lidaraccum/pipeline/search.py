@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lidaraccum.pipeline.advice import Leads, no_leads
 from lidaraccum.pipeline.courses import are_alike, way
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.gathering import WHOLE_GROWTH, with_middle
+from lidaraccum.pipeline.gathering import WHOLE_GROWTH, with_middle, without_walls
 from lidaraccum.pipeline.hypotheses import propose
 from lidaraccum.pipeline.joining import complete, join_parts
 from lidaraccum.pipeline.motion_settings import LIKELY, MotionSettings
@@ -102,7 +102,8 @@ def find_objects(
 def _filled(one: WindowObject, frames: Sequence[SightedFrame]) -> WindowObject:
     most_growth = WHOLE_GROWTH if one.unseen else np.inf
     course = one.centre, one.stamp, one.turn
-    picked = with_middle(one.picked, one.velocity, frames, *course, most_growth)
+    own = without_walls(one.picked, one.velocity, frames, *course)
+    picked = with_middle(own, one.velocity, frames, *course, most_growth)
     return replace(one, picked=picked)
 
 
