@@ -356,9 +356,8 @@ def test_factors_that_make_no_sense_are_refused(
     assert_refused(script, screened(tmp_path, drives, (old, new)), told)
 
 
-def test_the_example_screens_what_it_says(script: ModuleType) -> None:
-    plan, recipes, screening = script.read_plan(
-        read_toml(ROOT / "scripts" / "screening.toml"), "it"
-    )
+@pytest.mark.parametrize("name", ["screening", "screening_more"])
+def test_the_examples_screen_what_they_say(script: ModuleType, name: str) -> None:
+    plan, recipes, screening = script.read_plan(read_toml(ROOT / "scripts" / f"{name}.toml"), "it")
     settings = {repr(plan.settings_for(recipe, 0)) for recipe in recipes}
     assert len(settings) == len(recipes) == len(screening.runs)
