@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,8 @@ from scipy.spatial import cKDTree
 
 from lidaraccum.geometry.clustering import connected_cells
 from lidaraccum.geometry.voxel import thin
-from lidaraccum.pipeline.courses import turned, way
+from lidaraccum.pipeline.courses import turned
+from lidaraccum.pipeline.extents import BOX_MARGIN_M, WIDEST_M, along_way, width
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.landing import Lineup
 from lidaraccum.pipeline.motion_settings import MotionSettings
@@ -28,46 +28,20 @@ GATHERINGS = 3
 MOST_GROWTH = 8.0
 """What has so many times the points at one distance is something else: a wall that was touched."""
 
-BOX_MARGIN_M = 0.3
-"""So far outside a mover's box, or its strip, nothing is its own."""
-
-WHOLE_QUANTILES = (0.005, 0.995)
-"""A mover is at least as long and wide as these of its points, of all frames put together."""
-
 STANDING_SHARE = 0.1
 STANDING_MARGIN = 0.1
 """With more than this share of points that were met and never seen through, each is asked whether
 standing costs it so much less than moving."""
 
-PASSING_M = 0.3
 OUTLASTING_SHARE = 0.5
-"""A mover is at a place while it goes its length and this much more. What was there for longer
-stands beside it; but where more than this share of it would, its length or speed is wrong."""
+"""What was at a place for longer than a mover is stands beside it; but where more than this share
+of it would, its length or speed is wrong."""
 
-LONGEST_M = 25.0
-"""Nothing on a road is longer."""
-
-WIDEST_M = 4.0
 FLANK_SHARE = 0.5
 AS_ACCUSED = 0.98
-"""No vehicle is wider. Of what is, and lies beside the strip of this width along its way that was
-seen through most, up to the last share, that is something else which was seen through less than
-the second share as often: a hedge that the mover passes."""
-
-STRIP_M = 0.5
-STRIPS = 1000
-"""What lies along a mover's way is told apart in strips so wide and high, fewer than so many."""
-
-WALL_LOOKS = 10
-WALL_SHARE = 0.1
-WALL_ACCUSED = 0.02
-"""A strip stands that so many looks met when the mover was elsewhere, less than this share as many
-went through, and of whose points less than the last share was seen through by more than met it."""
-
-SKEW_RAD = np.deg2rad(np.arange(-35, 36, 5))
-ENDS = (0.01, 0.99)
-"""A vehicle in a bend lies askew to its way, by one of these. Its width lies between these
-quantiles of its points."""
+"""Of what is wider than a vehicle, and lies beside the strip of a vehicle's width along its way
+that was seen through most, up to the last share, that is something else which was seen through less
+than the first share as often: a hedge that the mover passes."""
 
 STRAY_SHARE = 0.02
 STRAY_GAP_M = 1.0
@@ -223,7 +197,7 @@ def without_flanks(
         stamp: Seconds.
         turn: Radians a second.
     """
-    shown, _, places = _along(picked, velocity, frames, centre, stamp, turn)
+    shown, _, places = along_way(picked, velocity, frames, centre, stamp, turn)
     if not shown:
         return {}
     own = [picked[frame.index] for frame in shown]
@@ -236,28 +210,10 @@ def without_flanks(
     return {frame.index: mine for frame, mine in zip(shown, kept, strict=True) if len(mine)}
 
 
-def _along(
-    picked: Mapping[int, NDArray[np.int64]],
-    velocity: NDArray[np.float64],
-    frames: Sequence[SightedFrame],
-    centre: NDArray[np.float64],
-    stamp: float,
-    turn: float,
-) -> tuple[list[SightedFrame], list[_Course], list[NDArray[np.float64]]]:
-    """The frames that show a mover, where it is in each, and places (K, 2) of its points there."""
-    shown = [frame for frame in frames if len(picked.get(frame.index, ()))]
-    courses = [_Course.at(frame.stamp - stamp, centre, velocity, turn) for frame in shown]
-    places = [
-        course.places(frame.world(picked[frame.index]))
-        for frame, course in zip(shown, courses, strict=True)
-    ]
-    return shown, courses, places
-
-
 def _is_flank(places: NDArray[np.float64], accused: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which of points at places (N, 2), metres along and aside, are beside what is accused most."""
     none, aside = np.zeros(len(places), dtype=np.bool_), places[:, 1]
-    if np.ptp(aside) <= WIDEST_M or not accused.any() or _width(places) <= WIDEST_M:
+    if np.ptp(aside) <= WIDEST_M or not accused.any() or width(places) <= WIDEST_M:
         return none
     everywhere, there = np.sort(aside), np.sort(aside[accused])
     starts = np.unique(np.concatenate([there, there - WIDEST_M]))
@@ -275,29 +231,6 @@ def _is_flank(places: NDArray[np.float64], accused: NDArray[np.bool_]) -> NDArra
     return flank
 
 
-def _width(places: NDArray[np.float64]) -> float:
-    """How wide, metres, points at places (N, 2) are across, however askew they may lie."""
-    across = places @ np.stack([np.sin(SKEW_RAD), np.cos(SKEW_RAD)])
-    low, high = np.quantile(across, ENDS, axis=0)
-    return float((high - low).min())
-
-
-def length_along(points: NDArray[np.float64], velocity: NDArray[np.float64]) -> float:
-    """Metres from end to end of points (N, 3), world, the way a velocity (3,) goes."""
-    return float(np.ptp(points[:, :2] @ velocity[:2]) / np.linalg.norm(velocity))
-
-
-def width_across(points: NDArray[np.float64], velocity: NDArray[np.float64]) -> float:
-    """Metres from side to side of points (N, 3), world, that go with a velocity (3,), or askew."""
-    course = _Course.at(0.0, points.mean(axis=0), velocity, 0.0)
-    return _width(course.places(points))
-
-
-def seconds_at_place(length_m: float, velocity: NDArray[np.float64]) -> float:
-    """How long a mover of such a length and velocity (3,) is at a place."""
-    return (length_m + PASSING_M) / float(np.linalg.norm(velocity))
-
-
 def without_outlasting(
     frame: SightedFrame, picked: NDArray[np.int64], seconds: float
 ) -> NDArray[np.int64]:
@@ -311,187 +244,3 @@ def without_strays(frame: SightedFrame, picked: NDArray[np.int64]) -> NDArray[np
     part = connected_cells(frame.points[picked], STRAY_GAP_M)
     counts = np.bincount(part)
     return picked[counts[part] >= min(STRAY_SHARE * len(picked), counts.max())]
-
-
-def with_middle(
-    picked: Mapping[int, NDArray[np.int64]],
-    velocity: NDArray[np.float64],
-    frames: Sequence[SightedFrame],
-    centre: NDArray[np.float64],
-    stamp: float,
-    turn: float,
-    most_growth: float = np.inf,
-) -> dict[int, NDArray[np.int64]]:
-    """A mover's points and what lies between them in their clusters, unless it is seen to stand.
-
-    A long side that slides along itself is seen through at its ends only, and in some frames at one
-    of them: it is as long as all frames together tell. What stands is seen there when the mover is
-    elsewhere: so are the walls and the roof of a tunnel, strip by strip, where its ends pass by.
-    Nothing is added that has ``most_growth`` times its points.
-    """
-    filled = dict(picked)
-    shown, courses, places = _along(picked, velocity, frames, centre, stamp, turn)
-    if not shown:
-        return filled
-    boxes = _boxes(courses, places)
-    between = [
-        _between(frame, picked[frame.index], box) for frame, box in zip(shown, boxes, strict=True)
-    ]
-    strips = _Strips.of(between, shown, boxes)
-    for frame, near, own in zip(shown, between, strips.parts, strict=True):
-        mine, more = picked[frame.index], near[(strips.through >= strips.met)[own]]
-        if len(more) < most_growth * len(mine):
-            filled[frame.index] = np.union1d(mine, more)
-    return filled
-
-
-def without_walls(
-    picked: Mapping[int, NDArray[np.int64]],
-    velocity: NDArray[np.float64],
-    frames: Sequence[SightedFrame],
-    centre: NDArray[np.float64],
-    stamp: float,
-    turn: float,
-) -> dict[int, NDArray[np.int64]]:
-    """A mover's points less what lies along its way and stays there when the mover is elsewhere.
-
-    The wall of a tunnel finds partners wherever it goes, as the side of a truck beside it does; but
-    the truck's ends are seen through, strip by strip, and of the wall nothing is.
-    """
-    shown, courses, places = _along(picked, velocity, frames, centre, stamp, turn)
-    if not shown:
-        return {}
-    own = [picked[frame.index] for frame in shown]
-    strips = _Strips.of(own, shown, _boxes(courses, places))
-    every = np.concatenate(strips.parts)
-    accused = np.concatenate(
-        [frame.through[mine] > frame.met[mine] for frame, mine in zip(shown, own, strict=True)]
-    )
-    count, blamed = (np.bincount(every, weight, len(strips.met)) for weight in (None, accused))
-    stands = (strips.met >= WALL_LOOKS) & (strips.through < WALL_SHARE * strips.met)
-    stands &= blamed < WALL_ACCUSED * count
-    if stands[every].all():
-        return dict(picked)
-    kept = [mine[~stands[part]] for mine, part in zip(own, strips.parts, strict=True)]
-    return {frame.index: mine for frame, mine in zip(shown, kept, strict=True) if len(mine)}
-
-
-def _boxes(courses: Sequence[_Course], places: Sequence[NDArray[np.float64]]) -> list[_Box]:
-    """Where a mover is in each frame, as large as its places (K, 2) of all frames together tell."""
-    low, high = np.quantile(np.concatenate(places), WHOLE_QUANTILES, axis=0)
-    return [
-        _Box(one, np.minimum(low, own.min(axis=0)), np.maximum(high, own.max(axis=0)))
-        for one, own in zip(courses, places, strict=True)
-    ]
-
-
-def _between(frame: SightedFrame, picked: NDArray[np.int64], box: _Box) -> NDArray[np.int64]:
-    """Which obstacles (K,) of the picked ones' clusters are in a box, too."""
-    near = _others_of_clusters(frame, picked)
-    return near[box.holds(frame.world(near), 0.0)]
-
-
-@dataclass(frozen=True, eq=False)
-class _Strips:
-    """Obstacles of some frames by strips along a mover's way, and what the frames say of them.
-
-    Attributes:
-        parts: (K,) int64 of each frame: which strip each of its obstacles is in.
-        through: (S,) looks through a strip's obstacles' places by frames in which the mover's box
-            is elsewhere.
-        met: (S,) such looks that met something.
-    """
-
-    parts: list[NDArray[np.int64]]
-    through: NDArray[np.int64]
-    met: NDArray[np.int64]
-
-    @classmethod
-    def of(
-        cls,
-        obstacles: Sequence[NDArray[np.int64]],
-        frames: Sequence[SightedFrame],
-        boxes: Sequence[_Box],
-    ) -> _Strips:
-        """Of obstacles (K,) of each frame, in which the mover is in a box."""
-        worlds = [frame.world(own) for frame, own in zip(frames, obstacles, strict=True)]
-        keys = [
-            _strip_keys(box.course.places(world)[:, 1], frame.heights[own])
-            for frame, own, world, box in zip(frames, obstacles, worlds, boxes, strict=True)
-        ]
-        strips, part = np.unique(np.concatenate(keys), return_inverse=True)
-        parts = np.split(part, np.cumsum([len(own) for own in obstacles])[:-1])
-        through, met = np.zeros((2, len(strips)), dtype=np.int64)
-        for frame, world, own in zip(frames, worlds, parts, strict=True):
-            for other, box in zip(frames, boxes, strict=True):
-                left = np.flatnonzero(~box.holds(world, BOX_MARGIN_M))
-                if other is not frame and len(left):
-                    seen = other.view.look(world[left], other.sensor_from_world)
-                    through += np.bincount(own[left], seen.through, len(strips)).astype(int)
-                    met += np.bincount(own[left], seen.met, len(strips)).astype(int)
-        return cls(parts, through, met)
-
-
-def _strip_keys(aside: NDArray[np.float64], heights: NDArray[np.float64]) -> NDArray[np.int64]:
-    cells = np.floor(np.stack([aside, heights], axis=1) / STRIP_M).astype(np.int64)
-    return np.asarray(cells[:, 0] * STRIPS + cells[:, 1])
-
-
-def _others_of_clusters(frame: SightedFrame, picked: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The obstacles of the picked ones' clusters that are not picked themselves."""
-    near = frame.in_clusters_of(picked)
-    near[picked] = False
-    return np.flatnonzero(near)
-
-
-@dataclass(frozen=True, eq=False)
-class _Course:
-    """A mover's level coordinates at one time: along its way and to the left of it.
-
-    Attributes:
-        here: (2,) metres, world: where its centre is.
-        axes: (2, 2) columns: unit vectors along and to the left.
-    """
-
-    here: NDArray[np.float64]
-    axes: NDArray[np.float64]
-
-    @classmethod
-    def at(
-        cls,
-        seconds: float,
-        centre: NDArray[np.float64],
-        velocity: NDArray[np.float64],
-        turn: float,
-    ) -> _Course:
-        """So long after the time of its centre (3,) and velocity (3,), turning so fast."""
-        ahead = turned(velocity, turn * seconds)[:2]
-        ahead = ahead / np.linalg.norm(ahead)
-        axes = np.array([ahead, [-ahead[1], ahead[0]]]).T
-        return cls((centre + way(velocity, turn, seconds))[:2], axes)
-
-    def places(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points (N, 3), world, along and to the left (N, 2), metres: what goes along stays."""
-        return np.asarray((points[:, :2] - self.here) @ self.axes)
-
-
-@dataclass(frozen=True, eq=False)
-class _Box:
-    """A level box that goes along with a mover.
-
-    Attributes:
-        course: Where the mover is.
-        low: (2,) metres along and to the left.
-        high: (2,) as well.
-    """
-
-    course: _Course
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-
-    def holds(self, points: NDArray[np.float64], margin_m: float) -> NDArray[np.bool_]:
-        """Which points (N, 3), world, lie in it, grown by a margin."""
-        along, across = self.course.places(points).T
-        low, high = self.low - margin_m, self.high + margin_m
-        inside = (along >= low[0]) & (along <= high[0])
-        return inside & (across >= low[1]) & (across <= high[1])

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from lidaraccum.pipeline.courses import are_alike
+from lidaraccum.pipeline.extents import LONGEST_M, WIDEST_M, length_along, width_across
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.gathering import LONGEST_M, WIDEST_M, length_along, width_across
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.objects import TEMPLATE_POINTS, WindowObject
 from lidaraccum.pipeline.suspects import Lead, template_of

@@ -10,12 +10,7 @@ from numpy.typing import NDArray
 
 from lidaraccum.pipeline.courses import turned
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.gathering import (
-    STANDING_MARGIN,
-    gather,
-    without_flanks,
-    without_standing,
-)
+from lidaraccum.pipeline.gathering import STANDING_MARGIN, gather, without_flanks, without_standing
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.suspects import (
     Suspect,

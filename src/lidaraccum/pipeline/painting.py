@@ -12,13 +12,9 @@ from lidaraccum.geometry import rigid
 from lidaraccum.geometry.clustering import connected_cells
 from lidaraccum.pipeline.association import Track
 from lidaraccum.pipeline.courses import course, turned
+from lidaraccum.pipeline.extents import length_along, seconds_at_place
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.gathering import (
-    length_along,
-    seconds_at_place,
-    without_outlasting,
-    without_strays,
-)
+from lidaraccum.pipeline.gathering import without_outlasting, without_strays
 from lidaraccum.pipeline.shape import ObjectShape
 
 LOW_REACH_M = 0.2

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from lidaraccum.pipeline.advice import Leads, no_leads
 from lidaraccum.pipeline.courses import are_alike, way
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.gathering import WHOLE_GROWTH, with_middle, without_walls
+from lidaraccum.pipeline.gathering import WHOLE_GROWTH
 from lidaraccum.pipeline.hypotheses import propose
 from lidaraccum.pipeline.joining import complete, join_parts
 from lidaraccum.pipeline.motion_settings import LIKELY, MotionSettings
 from lidaraccum.pipeline.objects import Expectation, FirstLook, WindowObject, explain, look_at
+from lidaraccum.pipeline.strips import with_middle, without_walls
 from lidaraccum.pipeline.suspects import (
     Lead,
     Suspect,

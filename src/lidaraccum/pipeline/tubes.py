@@ -14,13 +14,9 @@ from lidaraccum.geometry import rigid
 from lidaraccum.geometry.clustering import dense_groups
 from lidaraccum.model.reading import ObjectReading, WindowReading
 from lidaraccum.pipeline.courses import turned
+from lidaraccum.pipeline.extents import LONGEST_M, length_along, seconds_at_place
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.gathering import (
-    LONGEST_M,
-    length_along,
-    seconds_at_place,
-    without_outlasting,
-)
+from lidaraccum.pipeline.gathering import without_outlasting
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.suspects import Lead, Suspect
 
