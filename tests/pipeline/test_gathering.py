@@ -192,6 +192,8 @@ def test_the_roof_of_a_tunnel_above_a_bus_stays_and_does_not_keep_it_from_being_
     for mine in filled.values():
         assert (mine < 1400).sum() > 0.99 * 1400
     assert sum(int((mine >= 1400).sum()) for mine in filled.values()) == taken_along
+    few = with_middle(picked, VELOCITY, frames, *COURSE, 3.0)  # type: ignore[arg-type]
+    assert all(np.array_equal(few[index], mine) for index, mine in picked.items())
 
 
 def test_a_tunnels_wall_and_roof_that_slide_along_with_a_bus_stay() -> None:

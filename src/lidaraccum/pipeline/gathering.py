@@ -26,7 +26,8 @@ they are more than this share, unless it has so many times the points."""
 
 GATHERINGS = 3
 MOST_GROWTH = 8.0
-"""What has so many times the points at one distance is something else: a wall that was touched."""
+"""What has so many times the points at one distance is something else: a wall that was touched. Nor
+is so much between a mover's ends."""
 
 STANDING_SHARE = 0.1
 STANDING_MARGIN = 0.1
