@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lidaraccum.pipeline.courses import turned, way
-from lidaraccum.pipeline.extents import length_along, seconds_at_place
+from lidaraccum.pipeline.extents import Motion, length_along, seconds_at_place
 from lidaraccum.pipeline.gathering import without_flanks, without_strays
 from lidaraccum.pipeline.strips import with_middle, without_walls
 
@@ -66,8 +66,8 @@ def passing(turn: float, widths: tuple[float, float], shares: tuple[float, float
 
 def left_of(frames: list[Passing], turn: float) -> list[list[int]]:
     picked = {frame.index: np.arange(len(frame.points)) for frame in frames[:3]}
-    there = VELOCITY, frames, np.zeros(3), 0.0, turn
-    kept = without_flanks(picked, *there)  # type: ignore[arg-type]
+    going = Motion(VELOCITY, np.zeros(3), 0.0, turn)
+    kept = without_flanks(picked, going, frames)  # type: ignore[arg-type]
     assert sorted(kept) == [0, 1, 2]
     return [mine.tolist() for mine in kept.values()]
 
@@ -137,8 +137,8 @@ def test_a_bus_is_as_long_as_all_frames_together_tell(turn: float) -> None:
         ahead = turned(VELOCITY, turn * frame.stamp)
         along = (frame.points - way(VELOCITY, turn, frame.stamp)) @ (ahead / np.linalg.norm(ahead))
         picked[frame.index] = np.flatnonzero((end * along > 4.0) & (np.arange(700) < 400))
-    course = np.zeros(3), 0.0, turn
-    filled = with_middle(picked, VELOCITY, frames, *course)  # type: ignore[arg-type]
+    going = Motion(VELOCITY, np.zeros(3), 0.0, turn)
+    filled = with_middle(picked, going, frames)  # type: ignore[arg-type]
     for frame in frames:
         mine = filled[frame.index]
         assert len(mine) > 0.93 * 400  # the outermost is its, where it was picked
@@ -177,7 +177,7 @@ def tunnel() -> list[Tunnel]:
     return frames
 
 
-COURSE = np.zeros(3), 0.0, 0.0
+GOING = Motion(VELOCITY, np.zeros(3), 0.0)
 
 
 def test_the_roof_of_a_tunnel_above_a_bus_stays_and_does_not_keep_it_from_being_whole() -> None:
@@ -188,18 +188,18 @@ def test_the_roof_of_a_tunnel_above_a_bus_stays_and_does_not_keep_it_from_being_
         roof = (number >= 1400) & (number < 2000) & (number % 5 == 0)
         picked[frame.index] = np.flatnonzero((np.abs(along) > 8.0) & ((number < 1400) | roof))
     taken_along = sum(int((mine >= 1400).sum()) for mine in picked.values())
-    filled = with_middle(picked, VELOCITY, frames, *COURSE)  # type: ignore[arg-type]
+    filled = with_middle(picked, GOING, frames)  # type: ignore[arg-type]
     for mine in filled.values():
         assert (mine < 1400).sum() > 0.99 * 1400
     assert sum(int((mine >= 1400).sum()) for mine in filled.values()) == taken_along
-    few = with_middle(picked, VELOCITY, frames, *COURSE, 3.0)  # type: ignore[arg-type]
+    few = with_middle(picked, GOING, frames, 3.0)  # type: ignore[arg-type]
     assert all(np.array_equal(few[index], mine) for index, mine in picked.items())
 
 
 def test_a_tunnels_wall_and_roof_that_slide_along_with_a_bus_stay() -> None:
     frames = tunnel()
     picked = {frame.index: np.arange(2600) for frame in frames}
-    kept = without_walls(picked, VELOCITY, frames, *COURSE)  # type: ignore[arg-type]
+    kept = without_walls(picked, GOING, frames)  # type: ignore[arg-type]
     for mine in kept.values():
         assert (mine < 1400).sum() == 1400
         assert (mine >= 1400).sum() < 60
@@ -220,13 +220,13 @@ def test_what_follows_a_bus_closely_takes_nothing_from_it() -> None:
         for one in tunnel()
     ]
     picked = {frame.index: np.arange(1400) for frame in frames}
-    kept = without_walls(picked, VELOCITY, frames, *COURSE)  # type: ignore[arg-type]
+    kept = without_walls(picked, GOING, frames)  # type: ignore[arg-type]
     assert all(len(mine) == 1400 for mine in kept.values())
 
 
 def test_a_mover_of_which_nothing_is_left_is_no_trouble() -> None:
     frames = passing(0.0, (1.25, 4.0), (0.3, 0.08))
-    course = VELOCITY, frames, np.zeros(3), 0.0, 0.0
+    course = GOING, frames
     assert without_flanks({}, *course) == {}  # type: ignore[arg-type]
     assert with_middle({}, *course) == {}  # type: ignore[arg-type]
     assert without_walls({}, *course) == {}  # type: ignore[arg-type]

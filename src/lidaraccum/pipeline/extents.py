@@ -31,6 +31,23 @@ quantiles of its points."""
 
 
 @dataclass(frozen=True, eq=False)
+class Motion:
+    """Where a mover is at a time, and how it goes on.
+
+    Attributes:
+        velocity: (3,) m/s, world, at the stamp.
+        centre: (3,) metres, world, of some of its points at the stamp.
+        stamp: Seconds.
+        turn: Radians a second.
+    """
+
+    velocity: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    stamp: float
+    turn: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
 class Course:
     """A mover's level coordinates at one time: along its way and to the left of it.
 
@@ -43,18 +60,14 @@ class Course:
     axes: NDArray[np.float64]
 
     @classmethod
-    def at(
-        cls,
-        seconds: float,
-        centre: NDArray[np.float64],
-        velocity: NDArray[np.float64],
-        turn: float,
-    ) -> Course:
-        """So long after the time of its centre (3,) and velocity (3,), turning so fast."""
-        ahead = turned(velocity, turn * seconds)[:2]
+    def at(cls, motion: Motion, stamp: float) -> Course:
+        """Where a motion has come to by then."""
+        seconds = stamp - motion.stamp
+        ahead = turned(motion.velocity, motion.turn * seconds)[:2]
         ahead = ahead / np.linalg.norm(ahead)
         axes = np.array([ahead, [-ahead[1], ahead[0]]]).T
-        return cls((centre + way(velocity, turn, seconds))[:2], axes)
+        here = motion.centre + way(motion.velocity, motion.turn, seconds)
+        return cls(here[:2], axes)
 
     def places(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points (N, 3), world, along and to the left (N, 2), metres: what goes along stays."""
@@ -75,25 +88,15 @@ class Box:
     low: NDArray[np.float64]
     high: NDArray[np.float64]
 
-    def holds(self, points: NDArray[np.float64], margin_m: float) -> NDArray[np.bool_]:
-        """Which points (N, 3), world, lie in it, grown by a margin."""
-        along, across = self.course.places(points).T
-        low, high = self.low - margin_m, self.high + margin_m
-        inside = (along >= low[0]) & (along <= high[0])
-        return inside & (across >= low[1]) & (across <= high[1])
-
 
 def along_way(
     picked: Mapping[int, NDArray[np.int64]],
-    velocity: NDArray[np.float64],
+    motion: Motion,
     frames: Sequence[SightedFrame],
-    centre: NDArray[np.float64],
-    stamp: float,
-    turn: float,
 ) -> tuple[list[SightedFrame], list[Course], list[NDArray[np.float64]]]:
     """The frames that show a mover, where it is in each, and places (K, 2) of its points there."""
     shown = [frame for frame in frames if len(picked.get(frame.index, ()))]
-    courses = [Course.at(frame.stamp - stamp, centre, velocity, turn) for frame in shown]
+    courses = [Course.at(motion, frame.stamp) for frame in shown]
     places = [
         course.places(frame.world(picked[frame.index]))
         for frame, course in zip(shown, courses, strict=True)
@@ -110,14 +113,16 @@ def boxes_of(courses: Sequence[Course], places: Sequence[NDArray[np.float64]]) -
     ]
 
 
-def outside_boxes(boxes: Sequence[Box], points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(T, N) which points (N, 3), world, are outside each of T boxes and their margin."""
+def outside_boxes(
+    boxes: Sequence[Box], points: NDArray[np.float64], margin_m: float
+) -> NDArray[np.bool_]:
+    """(T, N) which points (N, 3), world, are outside each of T boxes, grown by a margin."""
     here, axes, low, high = (
         np.stack(one)
         for one in zip(*((b.course.here, b.course.axes, b.low, b.high) for b in boxes), strict=True)
     )
     places = (points[None, :, :2] - here[:, None]) @ axes
-    below, above = places < (low - BOX_MARGIN_M)[:, None], places > (high + BOX_MARGIN_M)[:, None]
+    below, above = places < (low - margin_m)[:, None], places > (high + margin_m)[:, None]
     return np.asarray((below | above).any(axis=2))
 
 
@@ -133,7 +138,7 @@ def seconds_at_place(length_m: float, velocity: NDArray[np.float64]) -> float:
 
 def width_across(points: NDArray[np.float64], velocity: NDArray[np.float64]) -> float:
     """Metres from side to side of points (N, 3), world, that go with a velocity (3,), or askew."""
-    course = Course.at(0.0, points.mean(axis=0), velocity, 0.0)
+    course = Course.at(Motion(velocity, points.mean(axis=0), 0.0), 0.0)
     return width(course.places(points))
 
 

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from lidaraccum.geometry.clustering import connected_cells
 from lidaraccum.geometry.voxel import thin
 from lidaraccum.pipeline.courses import turned
-from lidaraccum.pipeline.extents import BOX_MARGIN_M, WIDEST_M, along_way, width
+from lidaraccum.pipeline.extents import BOX_MARGIN_M, WIDEST_M, Motion, along_way, width
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.landing import Lineup
 from lidaraccum.pipeline.motion_settings import MotionSettings
@@ -180,11 +180,8 @@ def without_standing(
 
 def without_flanks(
     picked: Mapping[int, NDArray[np.int64]],
-    velocity: NDArray[np.float64],
+    motion: Motion,
     frames: Sequence[SightedFrame],
-    centre: NDArray[np.float64],
-    stamp: float,
-    turn: float,
 ) -> dict[int, NDArray[np.int64]]:
     """A mover's points less what is too far aside to be a vehicle's and seldom seen through.
 
@@ -192,23 +189,25 @@ def without_flanks(
 
     Args:
         picked: By frame index: its obstacles (K,).
-        velocity: (3,) m/s, world, at ``stamp``.
+        motion: Where it is and how it goes.
         frames: The window.
-        centre: (3,) metres, world, of some of its points at ``stamp``.
-        stamp: Seconds.
-        turn: Radians a second.
     """
-    shown, _, places = along_way(picked, velocity, frames, centre, stamp, turn)
+    shown, _, places = along_way(picked, motion, frames)
     if not shown:
         return {}
     own = [picked[frame.index] for frame in shown]
-    accused = [
-        frame.through[mine] > frame.met[mine] for frame, mine in zip(shown, own, strict=True)
-    ]
-    stays = ~_is_flank(np.concatenate(places), np.concatenate(accused))
+    stays = ~_is_flank(np.concatenate(places), accused_of(own, shown))
     parts = np.split(stays, np.cumsum([len(mine) for mine in own])[:-1])
     kept = [mine[part] for mine, part in zip(own, parts, strict=True)]
     return {frame.index: mine for frame, mine in zip(shown, kept, strict=True) if len(mine)}
+
+
+def accused_of(
+    obstacles: Sequence[NDArray[np.int64]], frames: Sequence[SightedFrame]
+) -> NDArray[np.bool_]:
+    """Which of all obstacles (K,) of each frame, in order, more frames saw through than met."""
+    pairs = zip(frames, obstacles, strict=True)
+    return np.concatenate([frame.through[own] > frame.met[own] for frame, own in pairs])
 
 
 def _is_flank(places: NDArray[np.float64], accused: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -54,10 +54,11 @@ def complete(
             for place, one in enumerate(completed)
             if not one.unseen and _share_within(one, lead) > WITHIN_SHARE
         ]
-        for place in sorted(inside, key=lambda place: -completed[place].size)[:1]:
-            rest = _rest(lead, completed, frames)
+        rest = _rest(lead, completed, frames)
+        if inside and rest:
+            place = max(inside, key=lambda place: completed[place].size)
             whole = _united(completed[place], replace(completed[place], picked=rest))
-            if rest and _is_one(completed[place], rest, whole, frames, settings):
+            if _is_one(completed[place], rest, whole, frames, settings):
                 completed[place] = whole
     return completed
 

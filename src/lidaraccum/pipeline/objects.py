@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.pipeline.courses import turned
+from lidaraccum.pipeline.extents import Motion
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.gathering import STANDING_MARGIN, gather, without_flanks, without_standing
 from lidaraccum.pipeline.motion_settings import MotionSettings
@@ -214,8 +215,9 @@ def explain(
     # Where nobody saw through, what it touches and what moves as well as it stands, stands.
     margin = -STANDING_MARGIN if unseen and settings.min_through >= 0 else STANDING_MARGIN
     picked = without_standing(picked, velocity, frames, settings, own.stamp, turn, margin)
+    motion = Motion(velocity, suspect.centre, own.stamp, turn)
     return WindowObject(
-        picked=without_flanks(picked, velocity, frames, suspect.centre, own.stamp, turn),
+        picked=without_flanks(picked, motion, frames),
         velocity=velocity,
         centre=suspect.centre,
         stamp=own.stamp,

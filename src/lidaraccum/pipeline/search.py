@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lidaraccum.pipeline.advice import Leads, no_leads
 from lidaraccum.pipeline.courses import are_alike, way
+from lidaraccum.pipeline.extents import Motion
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.gathering import MOST_GROWTH, WHOLE_GROWTH
 from lidaraccum.pipeline.hypotheses import propose
@@ -102,9 +103,9 @@ def find_objects(
 
 def _filled(one: WindowObject, frames: Sequence[SightedFrame]) -> WindowObject:
     most_growth = WHOLE_GROWTH if one.unseen else MOST_GROWTH
-    course = one.centre, one.stamp, one.turn
-    own = without_walls(one.picked, one.velocity, frames, *course)
-    picked = with_middle(own, one.velocity, frames, *course, most_growth)
+    motion = Motion(one.velocity, one.centre, one.stamp, one.turn)
+    own = without_walls(one.picked, motion, frames)
+    picked = with_middle(own, motion, frames, most_growth)
     return replace(one, picked=picked)
 
 

@@ -9,9 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.geometry.voxel import thin
-from lidaraccum.pipeline.extents import Box, along_way, boxes_of, outside_boxes
+from lidaraccum.pipeline.extents import (
+    BOX_MARGIN_M,
+    Box,
+    Motion,
+    along_way,
+    boxes_of,
+    outside_boxes,
+)
 from lidaraccum.pipeline.freespace import SightedFrame
-from lidaraccum.pipeline.gathering import STANDING_SHARE
+from lidaraccum.pipeline.gathering import STANDING_SHARE, accused_of
 
 STRIP_M = 0.5
 STRIPS = 1000
@@ -28,11 +35,8 @@ went through, and of whose points less than the last share was seen through by m
 
 def with_middle(
     picked: Mapping[int, NDArray[np.int64]],
-    velocity: NDArray[np.float64],
+    motion: Motion,
     frames: Sequence[SightedFrame],
-    centre: NDArray[np.float64],
-    stamp: float,
-    turn: float,
     most_growth: float = np.inf,
 ) -> dict[int, NDArray[np.int64]]:
     """A mover's points and what lies between them in their clusters, unless it is seen to stand.
@@ -43,7 +47,7 @@ def with_middle(
     Nothing is added that has ``most_growth`` times its points.
     """
     filled = dict(picked)
-    shown, courses, places = along_way(picked, velocity, frames, centre, stamp, turn)
+    shown, courses, places = along_way(picked, motion, frames)
     if not shown:
         return filled
     boxes = boxes_of(courses, places)
@@ -62,11 +66,8 @@ def with_middle(
 
 def without_walls(
     picked: Mapping[int, NDArray[np.int64]],
-    velocity: NDArray[np.float64],
+    motion: Motion,
     frames: Sequence[SightedFrame],
-    centre: NDArray[np.float64],
-    stamp: float,
-    turn: float,
 ) -> dict[int, NDArray[np.int64]]:
     """A mover's points less what lies along its way and stays there when the mover is elsewhere.
 
@@ -76,13 +77,11 @@ def without_walls(
     every = sum(map(len, picked.values()))
     if every == 0 or sum(_doubtful(picked, frames)) < STANDING_SHARE * every:
         return dict(picked)
-    shown, courses, places = along_way(picked, velocity, frames, centre, stamp, turn)
+    shown, courses, places = along_way(picked, motion, frames)
     own = [picked[frame.index] for frame in shown]
     strips = _Strips.of(own, shown, boxes_of(courses, places))
     part = np.concatenate(strips.parts)
-    accused = np.concatenate(
-        [frame.through[mine] > frame.met[mine] for frame, mine in zip(shown, own, strict=True)]
-    )
+    accused = accused_of(own, shown)
     count, blamed = (np.bincount(part, weight, len(strips.met)) for weight in (None, accused))
     stands = (strips.met >= WALL_LOOKS) & (strips.through < WALL_SHARE * strips.met)
     stands &= blamed < WALL_ACCUSED * count
@@ -101,7 +100,7 @@ def _doubtful(picked: Mapping[int, NDArray[np.int64]], frames: Sequence[SightedF
 def _between(frame: SightedFrame, picked: NDArray[np.int64], box: Box) -> NDArray[np.int64]:
     """Which obstacles (K,) of the picked ones' clusters are in a box, too."""
     near = _others_of_clusters(frame, picked)
-    return near[box.holds(frame.world(near), 0.0)]
+    return near[~outside_boxes([box], frame.world(near), 0.0)[0]]
 
 
 def _others_of_clusters(frame: SightedFrame, picked: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -148,7 +147,9 @@ class _Strips:
         ]
         for frame, few, all_of_it, part in zip(frames, spread, worlds, parts, strict=True):
             world, own = all_of_it[few], part[few]
-            for other, outside in zip(frames, outside_boxes(boxes, world), strict=True):
+            for other, outside in zip(
+                frames, outside_boxes(boxes, world, BOX_MARGIN_M), strict=True
+            ):
                 left = np.flatnonzero(outside)
                 if other is not frame and len(left):
                     seen = other.view.look(world[left], other.sensor_from_world)

@@ -91,7 +91,9 @@ def _muon_step(weight: torch.Tensor, state: dict[str, torch.Tensor], rate: float
     if weight.grad is None:
         return
     gradient = weight.grad.flatten(1)
-    momentum = state.setdefault(MUON_MEMORY, torch.zeros_like(gradient))
+    if MUON_MEMORY not in state:
+        state[MUON_MEMORY] = torch.zeros_like(gradient)
+    momentum = state[MUON_MEMORY]
     momentum.lerp_(gradient, 1.0 - MOMENTUM)
     way = orthogonal(gradient.lerp(momentum, MOMENTUM)).view(weight.shape)
     weight.add_(way, alpha=-rate * LIKE_ADAM * max(gradient.shape) ** 0.5)
