@@ -1,14 +1,15 @@
 """Averages the weights of runs that began from the same weights: better than each, at no cost.
 
-Usage: average_weights.py WEIGHTS WEIGHTS... -o OUT
+Usage: average_weights.py WEIGHTS WEIGHTS... -o OUT [--ego-pillars N]
 
-Source: Wortsman et al., "Model soups" (ICML 2022). The runs may differ in seed and recipe; the
-networks must have the same settings.
+Source: Wortsman et al., "Model soups" (ICML 2022). The runs may differ in seed and recipe, the
+networks only in how many pillars they match: the mean as many as the first, or as it is told.
 """
 
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -22,12 +23,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("weights", nargs="+", type=Path)
     parser.add_argument("-o", "--output", required=True, type=Path)
+    parser.add_argument("--ego-pillars", type=int, help="background pillars matched in a frame")
     options = parser.parse_args()
     networks = [load_network(path) for path in options.weights]
-    settings = {network.settings for network in networks}
+    mean = networks[0]
+    count = options.ego_pillars or mean.settings.ego_pillars
+    settings = {replace(network.settings, ego_pillars=count) for network in networks}
     if len(settings) > 1:
         parser.error("the networks differ in their settings")
-    mean = networks[0]
+    mean.settings = settings.pop()
     others = [dict(network.named_parameters()) for network in networks]
     with torch.no_grad():
         for name, values in mean.named_parameters():

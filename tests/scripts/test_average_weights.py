@@ -6,6 +6,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import pytest
 import torch
@@ -18,8 +19,8 @@ SCRIPT = Path(__file__).parents[2] / "scripts" / "average_weights.py"
 SMALL = NetworkSettings(extent_m=16.0, base_widths=(8, 8), motion_widths=(8, 8), ego_channels=8)
 
 
-def average(*names: Path, output: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, str(SCRIPT), *map(str, names), "-o", str(output)]
+def average(*names: Path, output: Path, more: tuple[str, ...] = ()) -> CompletedProcess[str]:
+    command = [sys.executable, str(SCRIPT), *map(str, names), "-o", str(output), *more]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
@@ -39,6 +40,17 @@ def test_every_weight_is_the_mean(files: list[Path], tmp_path: Path) -> None:
     for name, values in mean.named_parameters():
         expected = (parts[0][name] + parts[1][name] + parts[2][name]) / 3
         torch.testing.assert_close(values, expected)
+
+
+@pytest.mark.parametrize(("more", "count"), [((), 5), (("--ego-pillars", "9"), 9)])
+def test_it_matches_as_many_pillars_as_the_first_or_as_it_is_told(
+    files: list[Path], tmp_path: Path, more: tuple[str, ...], count: int
+) -> None:
+    """How many are matched is no matter of the weights: training takes fewer, for its time."""
+    save_network(build_network(replace(SMALL, ego_pillars=5)), files[0])
+    done = average(*files, output=tmp_path / "mean.safetensors", more=more)
+    assert done.returncode == 0, done.stderr
+    assert load_network(tmp_path / "mean.safetensors").settings.ego_pillars == count
 
 
 def test_other_networks_are_refused(files: list[Path], tmp_path: Path) -> None:

@@ -179,6 +179,7 @@ class Matcher(nn.Module):
         self.offset = nn.Parameter(torch.full((rounds,), settings.slack_start))
         self.scale = nn.Parameter(torch.full((rounds,), settings.scale_start))
         self.rematch_m = settings.rematch_m
+        self.finer_m = settings.finer_m
         self.sinkhorn_rounds = settings.sinkhorn_rounds
         self.fastest_mps = settings.fastest_mps
 
@@ -210,14 +211,16 @@ class Matcher(nn.Module):
             else:
                 motion = start
             rounds = [motion]
-            for number, near_m in enumerate(self.rematch_m, start=1):
+            last = len(self.rematch_m)
+            finer = () if self.training else self.finer_m
+            for number, near_m in enumerate((*self.rematch_m, *finer), start=1):
                 placed = move(motion.detach(), source.position)
                 apart = torch.cdist(placed, target.position)
                 # A normal distribution, cut off at two sigmas.
                 near = (-2.0 * (apart / near_m) ** 2).masked_fill_(
                     impossible | (apart > near_m), -torch.inf
                 )
-                motion, row_mass, column_mass = self._fit(source, target, near, number)
+                motion, row_mass, column_mass = self._fit(source, target, near, min(number, last))
                 rounds.append(motion)
             sensor = invert(target.level_from_sensor) @ motion @ source.level_from_sensor
         return EgoMatch(

@@ -210,10 +210,6 @@ class Network(nn.Module):
         feature = self.ego_head(base, owner.reshape(-1), cell.reshape(-1)).view(*index.shape, -1)
         return EgoPillars(frames.pillar_mean[index], feature, valid, frames.level_from_sensor)
 
-    def match(self, source: FrameFeatures, target: FrameFeatures, gap_s: torch.Tensor) -> EgoMatch:
-        """Proposed poses target_from_source of B pairs of frames, ``gap_s`` (B,) seconds apart."""
-        return self.matcher(source.ego, target.ego, gap_s)
-
     def match_windows(self, features: FrameFeatures, windows: Windows) -> EgoMatch:
         """Each source frame straight to its window's target, in the frames' order.
 

@@ -9,7 +9,7 @@ from lidaraccum.errors import SettingsError
 COARSEST_CELLS = 16
 """Grid sides are multiples of this, so that every level of both U-Nets halves evenly."""
 
-EFFORT = ("extent_m", "pillar_points", "ego_pillars")
+EFFORT = ("extent_m", "pillar_points", "ego_pillars", "finer_m")
 """Settings that say how much is looked at. Weights fit any, best those they learned with."""
 
 
@@ -39,6 +39,8 @@ class NetworkSettings:
         sinkhorn_rounds: Row and column normalisations.
         fastest_mps: Nothing is matched to what it could only reach faster.
         rematch_m: How far a pillar may lie from its partner each time it is matched again, metres.
+        finer_m: The same of further times, which training goes without: they match as the last of
+            ``rematch_m`` has learned to.
         temporal_channels: Channels of the temporal block, at half the grid's resolution.
         temporal_blocks: How many of them.
         temporal: How a window's frames are put together: ``max``, the largest of what they say, or
@@ -65,6 +67,7 @@ class NetworkSettings:
     sinkhorn_rounds: int = 3
     fastest_mps: float = 40.0
     rematch_m: tuple[float, ...] = (3.0, 1.5, 0.7)
+    finer_m: tuple[float, ...] = (0.7, 0.4, 0.4, 0.4)
     temporal_channels: int = 48
     temporal_blocks: int = 2
     temporal: str = "max"
@@ -76,6 +79,7 @@ class NetworkSettings:
         # A checkpoint's JSON brings lists.
         object.__setattr__(self, "base_widths", tuple(self.base_widths))
         object.__setattr__(self, "rematch_m", tuple(self.rematch_m))
+        object.__setattr__(self, "finer_m", tuple(self.finer_m))
         object.__setattr__(self, "motion_widths", tuple(self.motion_widths))
         if not 2 <= len(self.base_widths) <= 5 or not 2 <= len(self.motion_widths) <= 4:
             raise SettingsError("a U-Net has 2 to 5 levels (base), 2 to 4 (motion)")
