@@ -13,6 +13,7 @@ from lidaraccum.training.augment import NO_AUGMENTATION, AugmentSettings, Labell
 
 CHANGES = {
     "yaw": replace(NO_AUGMENTATION, yaw_deg=180.0),
+    "quarter turns": replace(NO_AUGMENTATION, quarter_turns=1.0),
     "flip": replace(NO_AUGMENTATION, flip=1.0),
     "reverse": replace(NO_AUGMENTATION, reverse=1.0),
     "tilt": replace(NO_AUGMENTATION, tilt_deg=3.0),
@@ -57,6 +58,17 @@ def test_poses_stay_rigid_and_the_ground_stays_one_plane(toy: ModuleType, change
         world = rigid.transform(labels.world_from_sensor, frame.points)
         spread.append(np.sort(world[:, 2])[: len(world) // 4])
     assert np.ptp(np.concatenate(spread)) < 0.01
+
+
+def test_quarter_turns_leave_what_lies_along_the_grid_along_it(toy: ModuleType) -> None:
+    first = window_of(toy)[0][0].points[:, :2]
+    turns = set()
+    for seed in range(20):
+        changed = augment(window_of(toy), CHANGES["quarter turns"], np.random.default_rng(seed))
+        turn = np.linalg.lstsq(first, changed[0][0].points[:, :2], rcond=None)[0].T
+        np.testing.assert_allclose(np.sort(np.abs(turn).ravel()), [0, 0, 1, 1], atol=1e-5)
+        turns.add(round(float(np.rad2deg(np.arctan2(turn[1, 0], turn[0, 0])))) % 360)
+    assert turns == {90, 180, 270}
 
 
 def test_stamps_go_up_backwards_too(toy: ModuleType) -> None:

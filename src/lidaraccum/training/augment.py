@@ -19,6 +19,8 @@ class AugmentSettings:
 
     Attributes:
         yaw_deg: Turned about z by up to this, either way.
+        quarter_turns: Chance of one, two or three quarter turns more: walls stay along the grid, as
+            they mostly lie when a sensor looks ahead, aside or back.
         flip: Chance of a mirror image.
         reverse: Chance of running backwards.
         height_m: Shifted in z by up to this, either way.
@@ -33,6 +35,7 @@ class AugmentSettings:
     """
 
     yaw_deg: float = 180.0
+    quarter_turns: float = 0.0
     flip: float = 0.5
     reverse: float = 0.3
     height_m: float = 0.75
@@ -44,12 +47,12 @@ class AugmentSettings:
     most_points: int = 80_000
 
     def __post_init__(self) -> None:
-        for name in ("flip", "reverse", "rings", "rays"):
+        for name in ("quarter_turns", "flip", "reverse", "rings", "rays"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise SettingsError(f"{name} is a share of 0 to 1, not {getattr(self, name)}")
 
 
-NO_AUGMENTATION = AugmentSettings(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
+NO_AUGMENTATION = AugmentSettings(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
 """Windows as they are: for validation."""
 
 LabelledFrame = tuple[Frame, Labels]
@@ -85,6 +88,8 @@ def augment(
 
 def _draw_motion(settings: AugmentSettings, rng: np.random.Generator) -> rigid.Pose:
     yaw = np.deg2rad(rng.uniform(-1, 1) * settings.yaw_deg)
+    if settings.quarter_turns and rng.random() < settings.quarter_turns:
+        yaw += 0.5 * np.pi * rng.integers(1, 4)
     tilt = np.deg2rad(rng.uniform(-1, 1, 2) * settings.tilt_deg)
     lift = rng.uniform(-1, 1) * settings.height_m
     turned = rigid.exponential(np.array([0.0, 0.0, yaw, 0.0, 0.0, 0.0]))
