@@ -1,7 +1,7 @@
 """Scores weights on the simulator's test set or a labelled drive, the network doing it all itself.
 
 Usage: score_weights.py WEIGHTS [--windows 40] [--extent 64] [--threads 2]
-                        [--drive DIR [--classed]] [--lift 0.0]
+                        [--drive DIR [--classed]] [--lift 0.0] [--turn 0]
 
 Prints two Markdown tables: the whole network beside the paper's figures (its own poses, masks,
 objects and motions; five frames, the first the target, ground included, sweeps compensated), and
@@ -66,14 +66,15 @@ def main() -> None:
     parser.add_argument("--drive", type=Path)
     parser.add_argument("--classed", action="store_true", help="leave out points of no class")
     parser.add_argument("--lift", type=float, default=0.0, help="tell heights so much too high, m")
+    parser.add_argument("--turn", type=float, default=0.0, help="turn all frames, degrees")
     options = parser.parse_args()
     torch.set_num_threads(options.threads)
     network = load_network(options.weights)
     what = (options.windows, options.extent, network.settings)
     batches = (
-        recorded_windows(options.drive, *what, classed=options.classed)
+        recorded_windows(options.drive, *what, classed=options.classed, yaw_deg=options.turn)
         if options.drive
-        else simulated_windows(*what)
+        else simulated_windows(*what, yaw_deg=options.turn)
     )
     batches = (lifted(batch, options.lift) for batch in batches)
     began = time.monotonic()

@@ -8,6 +8,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+import torch
 
 from lidaraccum.data.frame import Labels
 from lidaraccum.errors import InputError, SettingsError
@@ -49,6 +50,23 @@ def test_windows_are_spread_over_a_recording(asked: list[DriveSettings], toy: Mo
     assert len(list(recorded_windows(Path("6"), 3, 16.0, toy.SMALL))) == 2
     with pytest.raises(InputError, match="too few"):
         list(recorded_windows(Path("4"), 3, 16.0, toy.SMALL))
+
+
+def test_windows_may_be_seen_by_a_sensor_mounted_otherwise(
+    asked: list[DriveSettings], toy: ModuleType
+) -> None:
+    quarter = torch.tensor([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    pairs = [
+        (recorded_windows(Path("5"), 1, 16.0, toy.SMALL, yaw_deg=yaw) for yaw in (0.0, 90.0)),
+        (simulated_windows(1, 16.0, toy.SMALL, yaw_deg=yaw) for yaw in (0.0, 90.0)),
+    ]
+    for pair in pairs:
+        (before,), (after,) = pair
+        told = before.truth.target_from_frame[:, :3, 3]
+        moved = after.truth.target_from_frame[:, :3, 3]
+        assert told.abs().max() > 0.1
+        torch.testing.assert_close(moved, told @ quarter.T, atol=1e-4, rtol=0)
+        assert before.truth.dynamic.sum() == after.truth.dynamic.sum()
 
 
 def test_points_of_no_class_may_be_left_out(

@@ -86,6 +86,12 @@ def augment(
     return _backwards(changed) if backwards else changed
 
 
+def turned(frame: Frame, labels: Labels, yaw_deg: float) -> LabelledFrame:
+    """The frame as a sensor sees it that is mounted turned the other way, its labels with it."""
+    turn = rigid.exponential(np.array([0.0, 0.0, np.deg2rad(yaw_deg), 0.0, 0.0, 0.0]))
+    return _move(frame, labels, turn, np.eye(4), np.zeros(1))
+
+
 def _draw_motion(settings: AugmentSettings, rng: np.random.Generator) -> rigid.Pose:
     yaw = np.deg2rad(rng.uniform(-1, 1) * settings.yaw_deg)
     if settings.quarter_turns and rng.random() < settings.quarter_turns:

@@ -16,8 +16,9 @@ from lidaraccum.model.network import Network
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.simulation.drive import simulate
 from lidaraccum.simulation.windows import TEST_WINDOWS, held_out_numbers, held_out_settings
+from lidaraccum.training.augment import turned
 from lidaraccum.training.scores import Scores, score_network
-from lidaraccum.training.truth import make_window, window_of
+from lidaraccum.training.truth import make_window
 from lidaraccum.training.window import Batch, make_batch
 
 WINDOW = 5
@@ -82,16 +83,25 @@ def examine(
     return None if wants_end() else Marks(simulated, recorded)
 
 
-def simulated_windows(count: int, extent_m: float, settings: NetworkSettings) -> Iterator[Batch]:
-    """So many windows of the simulator's test set, on a grid of that side, metres."""
+def simulated_windows(
+    count: int, extent_m: float, settings: NetworkSettings, *, yaw_deg: float = 0.0
+) -> Iterator[Batch]:
+    """So many windows of the simulator's test set, on a grid of that side, metres; all turned."""
     for number in held_out_numbers(count) if count else ():
         drawn = replace(held_out_settings(number), compensated=True)
         drive = simulate(drawn)
-        yield make_batch([window_of(drive, range(len(drive)), settings, extent_m)])
+        frames = [turned(drive[place], drive.labels(place), yaw_deg) for place in range(len(drive))]
+        yield make_batch([make_window(frames, 0, settings, extent_m)])
 
 
 def recorded_windows(
-    folder: Path, count: int, extent_m: float, settings: NetworkSettings, *, classed: bool = False
+    folder: Path,
+    count: int,
+    extent_m: float,
+    settings: NetworkSettings,
+    *,
+    classed: bool = False,
+    yaw_deg: float = 0.0,
 ) -> Iterator[Batch]:
     """Windows spread evenly over a labelled drive, as its files are.
 
@@ -102,6 +112,7 @@ def recorded_windows(
         settings: The network's.
         classed: Points whose ``semantic`` class is 0 or less, nothing or unknown, count as not
             annotated, as in SemanticKITTI's own benchmark; else the file's ``annotated`` decides.
+        yaw_deg: All frames are turned so far about z, as if the sensor were mounted otherwise.
 
     Raises:
         InputError: The drive cannot be read, or is shorter than a window.
@@ -111,7 +122,10 @@ def recorded_windows(
         raise InputError(f"{folder} has {len(drive)} frames, too few for a window of {WINDOW}")
     starts = np.unique(np.linspace(0, len(drive) - WINDOW, count).astype(int)).tolist()
     for start in starts:
-        frames = [(drive[place], drive.labels(place)) for place in range(start, start + WINDOW)]
+        frames = [
+            turned(drive[place], drive.labels(place), yaw_deg)
+            for place in range(start, start + WINDOW)
+        ]
         if classed:
             frames = [(frame, _classed_alone(labels)) for frame, labels in frames]
         yield make_batch([make_window(frames, 0, settings, extent_m)])
