@@ -277,6 +277,20 @@ def test_a_parked_car_is_whole_beside_the_carrier_and_the_carrier_is_none(
     assert passed > 10_000
 
 
+def test_bonnet_and_tail_of_the_carrier_are_no_movers(look: Any, new_mover: Any) -> None:
+    """They reach beyond what is cut out about the sensor, and go as it goes; as do cars near by."""
+    carrier = new_mover(low=(-5.0, -1.2, 0.2), size=(10.0, 2.4, 1.0), velocity=(6.0, 0.0, 0.0))
+    beside = new_mover(low=(-1.0, 2.2, 0.2), size=(4.2, 1.8, 1.45), velocity=(6.0, 0.0, 0.0))
+    ahead = new_mover(low=(9.0, -0.9, 0.2), size=(4.2, 1.8, 1.45), velocity=(6.0, 0.0, 0.0))
+    street = look([carrier, beside, ahead], count=9, speed=6.0)
+    frames = perceive(street, Oracle(street, [carrier, beside, ahead]))
+    for frame, on in zip(frames, street.on, strict=True):
+        assert (on == 1).sum() > 5000
+        assert not (frame.label[on == 1] == MOVING).any()
+        assert (frame.label[on == 2] == MOVING).mean() > 0.9
+        assert (frame.label[on == 3] == MOVING).mean() > 0.9
+
+
 class GreedyOracle(Oracle):
     """Takes all that stands beside a mover for a part of it."""
 

@@ -24,12 +24,6 @@ WHOLE_QUANTILES = (0.005, 0.995)
 PASSING_M = 0.3
 """A mover is at a place while it goes its length and this much more."""
 
-BEARINGS = 36
-"""Directions about a sensor, told apart to see whether something lies all around it."""
-
-LEAST_IN_BEARING = 0.005
-"""A direction in which less than this share of something's points lie is none of its."""
-
 SKEW_RAD = np.deg2rad(np.arange(-35, 36, 5))
 ENDS = (0.01, 0.99)
 """A vehicle in a bend lies askew to its way, by one of these. Its width lies between these
@@ -130,20 +124,6 @@ def outside_boxes(
     places = (points[None, :, :2] - here[:, None]) @ axes
     below, above = places < (low - margin_m)[:, None], places > (high + margin_m)[:, None]
     return np.asarray((below | above).any(axis=2))
-
-
-def surrounds(points: NDArray[np.float64], viewpoint: NDArray[np.float64]) -> bool:
-    """Whether points (N, 3) lie about a viewpoint (3,) in more than half of all directions.
-
-    Seen from outside, no body takes up half of the way around: what does holds the sensor, and is
-    what carries it.
-    """
-    away = points[:, :2] - viewpoint[:2]
-    bearing = np.arctan2(away[:, 1], away[:, 0])
-    counts, _ = np.histogram(bearing, BEARINGS, (-np.pi, np.pi))
-    taken = np.flatnonzero(counts > LEAST_IN_BEARING * len(points))
-    gaps = np.diff(np.append(taken, taken[:1] + BEARINGS))
-    return bool(gaps.max(initial=0) < BEARINGS // 2)
 
 
 def length_along(points: NDArray[np.float64], velocity: NDArray[np.float64]) -> float:

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidaraccum.pipeline.advice import Leads, no_leads
+from lidaraccum.pipeline.carrier import is_carrier
 from lidaraccum.pipeline.courses import are_alike, way
-from lidaraccum.pipeline.extents import Motion, surrounds
+from lidaraccum.pipeline.extents import Motion
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.gathering import MOST_GROWTH, WHOLE_GROWTH
 from lidaraccum.pipeline.hypotheses import propose
@@ -98,17 +99,7 @@ def find_objects(
                 movers = _settle([meant], movers, frames, settings, SURE_SHARE)
     sure = [lead for lead, _ in looked if lead.trust >= LIKELY]
     whole = complete(join_parts(movers, frames, settings), sure, frames, settings)
-    return [_filled(one, frames) for one in whole if not _is_carrier(one, frames)]
-
-
-def _is_carrier(one: WindowObject, frames: Sequence[SightedFrame]) -> bool:
-    """Whether most of a mover lies all around the sensor: parts of the carrier beyond its cut."""
-    around = [
-        len(own) if surrounds(frame.points[own], frame.viewpoint) else -len(own)
-        for frame in frames
-        if len(own := one.of(frame))
-    ]
-    return sum(around) > 0
+    return [_filled(one, frames) for one in whole if not is_carrier(one, frames, settings)]
 
 
 def _filled(one: WindowObject, frames: Sequence[SightedFrame]) -> WindowObject:

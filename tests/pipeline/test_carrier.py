@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lidaraccum.evaluation.evaluate import EvaluationSettings, evaluate
 from lidaraccum.model.weights import shipped_weights
-from lidaraccum.pipeline.extents import surrounds
+from lidaraccum.pipeline.carrier import surrounds
 from lidaraccum.simulation.drive import simulate
 from lidaraccum.simulation.windows import held_out_settings
 
