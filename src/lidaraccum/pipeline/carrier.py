@@ -21,8 +21,10 @@ LEAST_IN_BEARING = 0.005
 LEAST_SPEED_MPS = 3.0
 """Who walks may walk close behind another; nothing drives so close behind or before the carrier."""
 
-SAME_MPS = 1.0
-"""What differs less from the carrier's velocity goes along with it."""
+SAME_MPS = 0.25
+ALIKE_MPS = 1.0
+"""So near to the carrier's velocity is that of its own parts, and what beams that travel along two
+rails say is theirs."""
 
 ABUTS_M = 0.4
 """What begins so near to the cut about the sensor may go on within it."""
@@ -34,39 +36,37 @@ ACROSS_M = 0.3
 def is_carrier(one: WindowObject, frames: Sequence[SightedFrame], settings: MotionSettings) -> bool:
     """Whether a mover is what carries the sensor: all around it, or its bonnet or tail."""
     shown = [frame for frame in frames if len(one.of(frame))]
-    around = [
-        len(one.of(frame)) * (1 if surrounds(frame.points[one.of(frame)], frame.viewpoint) else -1)
-        for frame in shown
-    ]
-    return sum(around) > 0 or _is_its_end(one, shown, settings.min_range_m)
-
-
-def surrounds(points: NDArray[np.float64], viewpoint: NDArray[np.float64]) -> bool:
-    """Whether points (N, 3) lie about a viewpoint (3,) in more than half of all directions.
-
-    Seen from outside, no body takes up half of the way around: what does holds the sensor, and is
-    what carries it.
-    """
-    away = points[:, :2] - viewpoint[:2]
-    bearing = np.arctan2(away[:, 1], away[:, 0])
-    counts, _ = np.histogram(bearing, BEARINGS, (-np.pi, np.pi))
-    taken = np.flatnonzero(counts > LEAST_IN_BEARING * len(points))
-    gaps = np.diff(np.append(taken, taken[:1] + BEARINGS))
-    return bool(gaps.max(initial=0) < BEARINGS // 2)
-
-
-def _is_its_end(one: WindowObject, shown: Sequence[SightedFrame], cut_m: float) -> bool:
-    """Whether a mover goes as the sensor does, across its way, from the cut about it on."""
     seconds = shown[-1].stamp - shown[0].stamp
     if seconds <= 0.0:
         return False
     sensors = [rigid.transform(frame.world_from_sensor, frame.viewpoint[None]) for frame in shown]
     carried = (sensors[-1] - sensors[0])[0] / seconds
-    speed = float(np.linalg.norm(carried))
-    if speed < LEAST_SPEED_MPS or np.linalg.norm(one.velocity - carried) > SAME_MPS:
+    apart = float(np.linalg.norm(one.velocity - carried))
+    if np.linalg.norm(carried) < LEAST_SPEED_MPS or apart > ALIKE_MPS:
         return False
     away = [frame.world(one.of(frame)) - own for frame, own in zip(shown, sensors, strict=True)]
+    around = sum(len(places) * (1 if surrounds(places) else -1) for places in away)
+    return around > 0 or (apart < SAME_MPS and _lies_across(away, carried, settings.min_range_m))
+
+
+def surrounds(places: NDArray[np.float64]) -> bool:
+    """Whether places (N, 3) about the sensor lie in more than half of all directions.
+
+    Seen from outside, no body takes up half of the way around: what does holds the sensor, and is
+    what carries it.
+    """
+    bearing = np.arctan2(places[:, 1], places[:, 0])
+    counts, _ = np.histogram(bearing, BEARINGS, (-np.pi, np.pi))
+    taken = np.flatnonzero(counts > LEAST_IN_BEARING * len(places))
+    gaps = np.diff(np.append(taken, taken[:1] + BEARINGS))
+    return bool(gaps.max(initial=0) < BEARINGS // 2)
+
+
+def _lies_across(
+    away: Sequence[NDArray[np.float64]], carried: NDArray[np.float64], cut_m: float
+) -> bool:
+    """Whether places (N, 3) about the sensor, by frame, lie across its way from the cut on."""
     nearest = np.median([np.linalg.norm(places, axis=1).min() for places in away])
-    left = np.array([-carried[1], carried[0]]) / speed
+    left = np.array([-carried[1], carried[0]]) / np.linalg.norm(carried[:2])
     low, high = np.quantile(np.concatenate(away)[:, :2] @ left, (0.05, 0.95))
     return bool(nearest < cut_m + ABUTS_M and low < -ACROSS_M and high > ACROSS_M)
