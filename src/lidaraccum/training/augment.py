@@ -88,8 +88,7 @@ def augment(
 
 def turned(frame: Frame, labels: Labels, yaw_deg: float) -> LabelledFrame:
     """The frame as a sensor sees it that is mounted turned the other way, its labels with it."""
-    turn = rigid.exponential(np.array([0.0, 0.0, np.deg2rad(yaw_deg), 0.0, 0.0, 0.0]))
-    return _move(frame, labels, turn, np.eye(4), np.zeros(1))
+    return _move(frame, labels, _about_z(np.deg2rad(yaw_deg)), np.eye(4), np.zeros(1))
 
 
 def _draw_motion(settings: AugmentSettings, rng: np.random.Generator) -> rigid.Pose:
@@ -98,9 +97,12 @@ def _draw_motion(settings: AugmentSettings, rng: np.random.Generator) -> rigid.P
         yaw += 0.5 * np.pi * rng.integers(1, 4)
     tilt = np.deg2rad(rng.uniform(-1, 1, 2) * settings.tilt_deg)
     lift = rng.uniform(-1, 1) * settings.height_m
-    turned = rigid.exponential(np.array([0.0, 0.0, yaw, 0.0, 0.0, 0.0]))
     tilted = rigid.exponential(np.array([tilt[0], tilt[1], 0.0, 0.0, 0.0, 0.0]))
-    return rigid.translation((0.0, 0.0, lift)) @ tilted @ turned
+    return rigid.translation((0.0, 0.0, lift)) @ tilted @ _about_z(yaw)
+
+
+def _about_z(yaw: float) -> rigid.Pose:
+    return rigid.exponential(np.array([0.0, 0.0, yaw, 0.0, 0.0, 0.0]))
 
 
 def _thin(frame: Frame, labels: Labels, keep: NDArray[np.bool_]) -> LabelledFrame:

@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from lidaraccum.data.frame import Labels
+from lidaraccum.data.sequence import LabelledSequence
 from lidaraccum.errors import InputError, SettingsError
 from lidaraccum.io.sequences import open_sequence
 from lidaraccum.model.network import Network
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.simulation.drive import simulate
 from lidaraccum.simulation.windows import TEST_WINDOWS, held_out_numbers, held_out_settings
-from lidaraccum.training.augment import turned
+from lidaraccum.training.augment import LabelledFrame, turned
 from lidaraccum.training.scores import Scores, score_network
 from lidaraccum.training.truth import make_window
 from lidaraccum.training.window import Batch, make_batch
@@ -90,7 +91,7 @@ def simulated_windows(
     for number in held_out_numbers(count) if count else ():
         drawn = replace(held_out_settings(number), compensated=True)
         drive = simulate(drawn)
-        frames = [turned(drive[place], drive.labels(place), yaw_deg) for place in range(len(drive))]
+        frames = _turned(drive, range(len(drive)), yaw_deg)
         yield make_batch([make_window(frames, 0, settings, extent_m)])
 
 
@@ -122,13 +123,14 @@ def recorded_windows(
         raise InputError(f"{folder} has {len(drive)} frames, too few for a window of {WINDOW}")
     starts = np.unique(np.linspace(0, len(drive) - WINDOW, count).astype(int)).tolist()
     for start in starts:
-        frames = [
-            turned(drive[place], drive.labels(place), yaw_deg)
-            for place in range(start, start + WINDOW)
-        ]
+        frames = _turned(drive, range(start, start + WINDOW), yaw_deg)
         if classed:
             frames = [(frame, _classed_alone(labels)) for frame, labels in frames]
         yield make_batch([make_window(frames, 0, settings, extent_m)])
+
+
+def _turned(drive: LabelledSequence, places: range, yaw_deg: float) -> list[LabelledFrame]:
+    return [turned(drive[place], drive.labels(place), yaw_deg) for place in places]
 
 
 def _classed_alone(labels: Labels) -> Labels:
