@@ -18,7 +18,7 @@ from lidaraccum.model.checkpoint import (
     save_network,
     write_tensors,
 )
-from lidaraccum.model.network import Network
+from lidaraccum.model.network import Network, build_network
 from lidaraccum.model.weights import weights_hash
 
 
@@ -40,14 +40,16 @@ def test_the_network_comes_back_with_its_settings_and_answers(
 def test_a_file_from_before_a_setting_is_read_as_it_was_made(
     network: Network, tmp_path: Path
 ) -> None:
-    """Older networks learned on all points of a pillar."""
+    """Older networks learned on all points of a pillar, and objects' shifts from centroids."""
+    network = build_network(replace(network.settings, tube="centroid"))
     path = tmp_path / "weights.safetensors"
     save_network(network, path)
     tensors, metadata = read_tensors(path)
     settings = json.loads(metadata["settings"])
-    del settings["pillar_points"]
+    del settings["pillar_points"], settings["tube"]
     write_tensors(tensors, metadata | {"settings": json.dumps(settings)}, path)
     assert load_network(path).settings.pillar_points == 0
+    assert load_network(path).settings.tube == "centroid"
     asked = replace(network.settings, pillar_points=5, ego_pillars=9, point_hidden=99)
     again = load_network(path, effort=asked).settings
     assert (again.pillar_points, again.ego_pillars) == (5, 9)

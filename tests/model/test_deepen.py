@@ -43,6 +43,20 @@ def test_more_levels_change_nothing_until_they_learn(
         torch.testing.assert_close(new, old)
 
 
+def test_another_kind_of_tube_net_begins_anew_and_all_else_stays(
+    network: Network, frames: list[Frame]
+) -> None:
+    own = network.settings
+    changed = deepened(network, replace(own, tube="centroid")).eval()
+    assert changed.settings.tube == "centroid"
+    for old, new in zip(answers(network, frames), answers(changed, frames), strict=True):
+        assert torch.equal(new, old)
+    same, other = network.state_dict(), changed.state_dict()
+    kept = {name for name in same if name in other and torch.equal(same[name], other[name])}
+    assert all(name in kept for name in same if not name.startswith("tube_net."))
+    assert "tube_net.place.0.weight" not in kept
+
+
 def test_the_levels_added_learn_from_the_second_step_on(
     network: Network, frames: list[Frame]
 ) -> None:

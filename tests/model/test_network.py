@@ -209,8 +209,9 @@ def test_points_that_are_not_read_are_answered_by_their_pillars(
     assert network.track(some, ids).ids.tolist() == [7]
 
 
-def test_fresh_tracks_stand_still(network: Network, frames: list[Frame]) -> None:
-    features = encode(network, frames[:3], 16.0)
+def test_what_is_seen_alike_three_times_stands_still(network: Network, frames: list[Frame]) -> None:
+    same = [replace(frames[0], stamp=0.1 * time) for time in range(3)]
+    features = encode(network, same, 16.0)
     seen = network.perceive(features, still(3), Windows.single(3))
     ids = torch.where(seen.position[:, 0] > 0, 7, 0)
     objects = network.track(seen, ids)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import ModuleType
 
 import pytest
@@ -82,6 +83,46 @@ def test_the_terms_count_as_they_are_weighted(batch: Batch, toy: ModuleType) -> 
     torch.testing.assert_close(losses.total, plain)
     with pytest.raises(SettingsError, match="weights"):
         ObjectiveSettings(offset_weight=-0.1)
+
+
+def test_tube_net_learns_alone(batch: Batch, toy: ModuleType) -> None:
+    network = build_network(toy.SMALL).train()
+    settings = ObjectiveSettings(tube_alone=True, object_weight=0.5, cluster_draws=3)
+    losses = objective(network, batch, settings, torch.Generator().manual_seed(1))
+    total, *others, objects = losses.numbers()
+    assert (others, total) == ([0.0] * 4, pytest.approx(0.5 * objects))
+    losses.total.backward()
+    for name, parameter in network.named_parameters():
+        assert (parameter.grad is not None) == name.startswith("tube_net."), name
+    with pytest.raises(SettingsError, match="TubeNet alone"):
+        ObjectiveSettings(tube_alone=True, poses="own")
+
+
+def test_objects_made_wrong_several_times_are_averaged(batch: Batch, toy: ModuleType) -> None:
+    """Objects as they are come out the same each time."""
+    network = build_network(toy.SMALL)
+    settings = ObjectiveSettings(poses="true", clusters=TRUE_CLUSTERS)
+    once, often = (
+        objective(network, batch, replace(settings, cluster_draws=draws), generator).objects
+        for draws in (1, 3)
+        for generator in (torch.Generator().manual_seed(4),)
+    )
+    torch.testing.assert_close(often, once)
+
+
+def test_turns_count_as_they_are_weighted(batch: Batch, toy: ModuleType) -> None:
+    network = build_network(toy.SMALL)
+    terms = [
+        objective(
+            network,
+            batch,
+            ObjectiveSettings(rotation_weight=weight),
+            torch.Generator().manual_seed(4),
+        ).objects
+        for weight in (0.0, 10.0, 20.0)
+    ]
+    torch.testing.assert_close(terms[2] - terms[1], terms[1] - terms[0])
+    assert terms[1] > terms[0]
 
 
 def test_the_same_lot_gives_the_same_loss(batch: Batch, toy: ModuleType) -> None:

@@ -13,7 +13,7 @@ from lidaraccum.model.batch import FrameTensors, to_arrays
 from lidaraccum.model.kabsch import chain, invert, move
 from lidaraccum.model.motion import Windows
 from lidaraccum.model.network import FrameFeatures, ObjectMotions, Perception, close_points
-from lidaraccum.model.tube import gather_tubes
+from lidaraccum.model.tubes import gather_tubes
 from lidaraccum.training.alone import cluster_by_offsets
 from lidaraccum.training.end_to_end import goal_of
 from lidaraccum.training.objective import object_poses, offset_truth, source_index, true_motion

@@ -1,4 +1,4 @@
-"""Levels added below those of a trained network, which answers as before until they have learned.
+"""Parts added to a trained network, which answers as before until they have learned.
 
 Source: Net2Net (Chen et al., ICLR 2016): a deeper network that begins as the same function.
 """
@@ -17,18 +17,21 @@ from lidaraccum.model.unet import channels_last
 def deepened(network: Network, settings: NetworkSettings) -> Network:
     """A network with as many levels as the settings ask for, which says what this one says.
 
+    Where the settings ask for another kind of TubeNet, a fresh one takes the trained one's place.
+
     Args:
         network: Trained. It is returned as it is where the settings ask for no more levels, or for
-            others.
+            others, and for its own kind of TubeNet.
         settings: Whose ``base_widths`` and ``motion_widths`` to reach, where they begin with the
-            network's own. The new levels begin alike, whoever asks: runs that go on from the same
-            weights may be averaged.
+            network's own, and whose ``tube``. What is new begins alike, whoever asks: runs that
+            go on from the same weights may be averaged.
     """
     own = network.settings
     deeper = replace(
         own,
         base_widths=_longer(own.base_widths, settings.base_widths),
         motion_widths=_longer(own.motion_widths, settings.motion_widths),
+        tube=settings.tube,
     )
     if deeper == own:
         return network
@@ -36,11 +39,13 @@ def deepened(network: Network, settings: NetworkSettings) -> Network:
     with torch.no_grad():
         grown.backbone.go_on_from(network.backbone)
         grown.motion_map.unet.go_on_from(network.motion_map.unet)
-        levels = ("backbone.", "motion_map.unet.")
+        anew = ["backbone.", "motion_map.unet."]
+        if deeper.tube != own.tube:
+            anew.append("tube_net.")
         rest = {
             name: values
             for name, values in network.state_dict().items()
-            if not name.startswith(levels)
+            if not name.startswith(tuple(anew))
         }
         grown.load_state_dict(rest, strict=False)
     channels_last(grown)

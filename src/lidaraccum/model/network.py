@@ -16,7 +16,8 @@ from lidaraccum.model.motion import MotionMap, PointHead, Windows, read
 from lidaraccum.model.pillars import PillarEncoder
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.model.steady import outward, steady
-from lidaraccum.model.tube import TubeMotions, TubeNet, Tubes, gather_tubes
+from lidaraccum.model.tube_net import TubeMotions, TubeNet
+from lidaraccum.model.tubes import Tubes, gather_tubes
 from lidaraccum.model.unet import UNet, channels_last, convolution, to_one_channel
 
 FOREGROUND_GATE = -1.0

@@ -48,6 +48,8 @@ class NetworkSettings:
         motion_widths: Channels of the motion U-Net by level, from half resolution on; the first
             is that of the motion features.
         point_channels: Channels of a point's motion features.
+        tube: How an object's shift is had: by its ``edges``, or as a share of the gap between its
+            centroids (``centroid``); see `model.tube_net`.
         tube_channels: Channels of what TubeNet says of an object's positions in one frame.
     """
 
@@ -73,6 +75,7 @@ class NetworkSettings:
     temporal: str = "max"
     motion_widths: tuple[int, ...] = (64, 96, 128, 160)
     point_channels: int = 128
+    tube: str = "edges"
     tube_channels: int = 128
 
     def __post_init__(self) -> None:
@@ -85,6 +88,8 @@ class NetworkSettings:
             raise SettingsError("a U-Net has 2 to 5 levels (base), 2 to 4 (motion)")
         if self.temporal not in ("max", "decay"):
             raise SettingsError(f"temporal is max or decay, not {self.temporal!r}")
+        if self.tube not in ("edges", "centroid"):
+            raise SettingsError(f"tube is edges or centroid, not {self.tube!r}")
         if self.standing_odds <= 0.0:
             raise SettingsError("standing_odds is more than 0")
         if self.lowest_m >= self.highest_m:

@@ -8,7 +8,7 @@ import torch
 
 from lidaraccum.model.kabsch import chain, compose, exactly, invert
 from lidaraccum.model.motion import Windows
-from lidaraccum.model.tube import quaternion_of, rotation_of
+from lidaraccum.model.quaternion import quaternion_of, rotation_of
 
 
 def outward(windows: Windows) -> list[list[int]]:

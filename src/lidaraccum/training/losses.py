@@ -8,11 +8,10 @@ from torch.nn import functional
 from lidaraccum.model.ego_motion import EgoMatch
 from lidaraccum.model.kabsch import about, chain, invert, move
 from lidaraccum.model.network import ObjectMotions
-from lidaraccum.model.tube import quaternion_of
+from lidaraccum.model.quaternion import quaternion_of
 
 LARGEST_CLASS_WEIGHT = 50.0
 INLIER_WEIGHT = 0.005
-ROTATION_WEIGHT = 50.0
 ITERATION_WEIGHTS = (0.7, 1.0)
 STILL_WEIGHT = 0.2
 FEWEST_POINTS = 50
@@ -88,14 +87,18 @@ def offset_loss(offset: torch.Tensor, truth: torch.Tensor) -> torch.Tensor:
 
 
 def object_loss(
-    objects: ObjectMotions, true_motion: torch.Tensor, weight: torch.Tensor
+    objects: ObjectMotions,
+    true_motion: torch.Tensor,
+    weight: torch.Tensor,
+    rotation_weight: float,
 ) -> torch.Tensor:
-    """TubeNet's loss over its iterations: moved points, translation, and 50 times rotation.
+    """TubeNet's loss over its iterations: moved points, translation, and rotation.
 
     Args:
         objects: K objects over T times.
         true_motion: (K, T, 4, 4) true target_from_aligned, level coordinates of the target.
         weight: (K, T) of each object and time; see `object_weights`.
+        rotation_weight: How much a quaternion's error counts; 50 in the paper.
     """
     tubes = objects.tubes
     truth = about(true_motion, tubes.anchor[:, None])
@@ -111,7 +114,7 @@ def object_loss(
     for share, quaternion, shift, motion in steps:
         missing = chain(truth, invert(before))
         turned = functional.normalize(quaternion, dim=-1) - quaternion_of(missing[..., :3, :3])
-        regressed = _length(shift - missing[..., :3, 3]) + ROTATION_WEIGHT * _length(turned)
+        regressed = _length(shift - missing[..., :3, 3]) + rotation_weight * _length(turned)
         total = total + share * (_mean(regressed, weight) + _moved(motion, truth, objects, weight))
         before = motion.detach()
     return total

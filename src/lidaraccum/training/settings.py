@@ -24,8 +24,8 @@ class OptimiserSettings:
         decay: Of an epoch.
         epoch_steps: Steps that count as an epoch; simulation has no end.
         warmup_steps: Over which the rate rises from nothing.
-        clip: Longest gradient of each part of the network by itself: TubeNet's, with rotations
-            counting 50 times, is dozens of times longer than the others' and would drown them.
+        clip: Longest gradient of each part of the network by itself: TubeNet's is many times longer
+            than the others' and would drown them.
         muon: Muon for the layers' matrices, Adam for the rest only (see `training.optimiser`).
         average: Share of the old in the running mean of the weights, which is what is kept.
         batch: Windows a step.
@@ -54,7 +54,7 @@ class TrainSettings:
 
     Attributes:
         network: The network's; when ``start_from`` is given, of it only `model.settings.EFFORT` and
-            levels below those of the weights (see `model.deepen`).
+            levels below those of the weights, and the kind of TubeNet (see `model.deepen`).
         windows: How windows are cut and changed.
         objective: What the loss is made of.
         optimiser: The optimiser and its schedule.

@@ -7,7 +7,7 @@ import pytest
 import torch
 from scipy.spatial.transform import Rotation
 
-from lidaraccum.model.tube import quaternion_of, rotation_of
+from lidaraccum.model.quaternion import quaternion_of, rotation_of
 
 
 def rotations() -> np.ndarray:

@@ -1,0 +1,170 @@
+"""How far an object has gone, by its edges: each tells one way only, and not all can be trusted.
+
+The mean of what is seen of a car wanders over it as it passes; its rear stays where it is.
+"""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import nn
+
+from lidaraccum.model.kabsch import compose, move
+from lidaraccum.model.tubes import LENGTH_M, Tubes, centroid_gap
+
+DIRECTIONS = 16
+"""In the horizontal plane, evenly about: the outermost point in each is an edge."""
+
+_FURTHEST_M = 3.0
+"""What one edge says beyond what the centroid says is told up to here."""
+_EMPTY_M = -1e4
+_NEAR_M = 0.1
+"""Who went less than about this has no direction of going."""
+_BREATH = 1e-3
+"""Of the centroid, which decides where edges say nothing."""
+
+
+class EdgeShift(nn.Module):
+    """The shift that takes an object's edges at each time to those at its anchor's time.
+
+    Edge k, outermost along n_k, is g_k short of where it is at the anchor's time, so a shift s
+    should have n_k s = g_k; the centroid asks for its own gap, in all directions. The shift is the
+    least-squares answer. How much each counts is learned, the same function for all directions: an
+    edge that is turned away from the sensor, or that others hide, is no edge of the object.
+    Upwards the answer lies between what mean, highest and lowest point say.
+    """
+
+    directions: torch.Tensor
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.told = nn.Linear(channels, 32)
+        self.seen = nn.Linear(7, 32)
+        last = nn.Linear(32, 1)
+        nn.init.normal_(last.weight, std=1e-3)  # all edges alike at first
+        self.trust = nn.Sequential(
+            nn.ReLU(inplace=True), nn.Linear(32, 32), nn.ReLU(inplace=True), last
+        )
+        self.centre = nn.Linear(channels, 1)
+        self.height = nn.Linear(channels, 3)
+        angle = torch.arange(DIRECTIONS) * (2.0 * math.pi / DIRECTIONS)
+        ways = torch.stack([torch.cos(angle), torch.sin(angle)], dim=1)
+        self.register_buffer("directions", ways, persistent=False)
+
+    def forward(
+        self, tubes: Tubes, said: torch.Tensor, moved: torch.Tensor, gone: torch.Tensor
+    ) -> torch.Tensor:
+        """Shifts (K, T, 3), metres; 0 for times an object was not seen.
+
+        Args:
+            tubes: Points of K objects over T times.
+            said: (K, T, C) what TubeNet thinks of each.
+            moved: (Q, 3) the points about their anchors, moved so far.
+            gone: (K, T, 3) metres they were shifted so far.
+        """
+        gap = centroid_gap(moved, tubes)
+        reach = _outermost(moved[:, :2] @ self.directions.T, tubes)
+        ahead = torch.where((tubes.counts > 0)[..., None], tubes.at_anchor(reach) - reach, 0.0)
+        circumstances = self._describe(tubes, gap, reach, ahead, gone)
+        told = self.told(said)[:, :, None] + self.seen(circumstances)
+        trust = torch.cat([self.centre(said), self.trust(told)[..., 0]], dim=2).softmax(dim=2)
+        flat = self._solve(trust, ahead, gap[..., :2])
+        upward = torch.cat([gap[..., 2:], _vertical_gaps(moved[:, 2], tubes)], dim=2)
+        height = (self.height(said).softmax(dim=2) * upward).sum(dim=2, keepdim=True)
+        return torch.cat([flat, height], dim=2)
+
+    def _describe(
+        self,
+        tubes: Tubes,
+        gap: torch.Tensor,
+        reach: torch.Tensor,
+        ahead: torch.Tensor,
+        gone: torch.Tensor,
+    ) -> torch.Tensor:
+        """(K, T, D, 7): what tells whether an edge can be trusted, seen along its direction."""
+        seen = (tubes.counts > 0)[..., None]
+        reach = torch.where(seen, reach, 0.0)
+        going = gap[..., :2] + gone[..., :2]
+        going = going / torch.linalg.vector_norm(going, dim=2, keepdim=True).clamp_min(_NEAR_M)
+        bearing = tubes.bearing() @ self.directions.T
+        across = reach + torch.roll(reach, DIRECTIONS // 2, dims=2)
+        beyond = ahead - gap[..., :2] @ self.directions.T
+        return torch.stack(
+            [
+                beyond.clamp(-_FURTHEST_M, _FURTHEST_M),
+                bearing[:, None].expand_as(reach),
+                going @ self.directions.T,
+                across / LENGTH_M,
+                reach / LENGTH_M,
+                tubes.plenty()[..., None].expand_as(reach),
+                ahead.clamp(-_FURTHEST_M, _FURTHEST_M),
+            ],
+            dim=3,
+        )
+
+    def _solve(self, trust: torch.Tensor, ahead: torch.Tensor, gap: torch.Tensor) -> torch.Tensor:
+        """(K, T, 2): weighted least squares over the centroid's say and each edge's."""
+        centre, edges = trust[..., :1] + _BREATH, trust[..., 1:]
+        ways = self.directions
+        aim = (edges * ahead) @ ways + centre * gap
+        xx, xy, yy = (
+            edges @ (ways[:, i] * ways[:, j]) + (centre[..., 0] if i == j else 0.0)
+            for i, j in ((0, 0), (0, 1), (1, 1))
+        )
+        x, y = aim.unbind(dim=2)
+        whole = xx * yy - xy * xy
+        return torch.stack([(yy * x - xy * y) / whole, (xx * y - xy * x) / whole], dim=2)
+
+
+class StraightOn(nn.Module):
+    """Draws an object's shifts towards those of steady motion, as far as that is to be believed.
+
+    Frames err each in its own way, and few objects change their speed within half a second.
+    """
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.say = nn.Linear(channels, 2)
+        nn.init.zeros_(self.say.weight)
+        nn.init.zeros_(self.say.bias)
+
+    def forward(
+        self,
+        tubes: Tubes,
+        said: torch.Tensor,
+        rotation: torch.Tensor,
+        shift: torch.Tensor,
+        gone: torch.Tensor,
+    ) -> torch.Tensor:
+        """Shifts (K, T, 3) of a step, metres.
+
+        Args:
+            tubes: Points of K objects over T times.
+            said: (K, T, C) what TubeNet thinks of each.
+            rotation: (K, T, 3, 3) of the step.
+            shift: (K, T, 3) of the step, as regressed.
+            gone: (K, T, 3) metres shifted before.
+        """
+        whole = move(compose(rotation, shift), gone[:, :, None])[:, :, 0]
+        count, drawn = self.say(said).sigmoid().unbind(dim=2)
+        seconds = tubes.seconds_by_time()
+        count = torch.where(tubes.fixed(), 0.0, count)
+        velocity = ((count * seconds)[..., None] * whole).sum(dim=1)
+        velocity = velocity / ((count * seconds**2).sum(dim=1, keepdim=True) + 1e-6)
+        steady = velocity[:, None] * seconds[..., None]
+        return shift + drawn[..., None] * (steady - whole)
+
+
+def _outermost(values: torch.Tensor, tubes: Tubes) -> torch.Tensor:
+    """(K, T, D): the largest of an object's values (Q, D) at a time; very low where not seen."""
+    start = values.new_full((tubes.counts.numel(), values.shape[1]), _EMPTY_M)
+    slot = tubes.slot()[:, None].expand_as(values)
+    return start.scatter_reduce(0, slot, values, "amax").view(*tubes.counts.shape, -1)
+
+
+def _vertical_gaps(height: torch.Tensor, tubes: Tubes) -> torch.Tensor:
+    """(K, T, 2) metres from highest and lowest point at each time to those at the anchor's."""
+    ends = _outermost(torch.stack([height, -height], dim=1), tubes)
+    ahead = (tubes.at_anchor(ends) - ends) * ends.new_tensor([1.0, -1.0])
+    return torch.where((tubes.counts > 0)[..., None], ahead, 0.0)
