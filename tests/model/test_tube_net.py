@@ -8,10 +8,10 @@ import pytest
 import torch
 
 from lidaraccum.errors import SettingsError
-from lidaraccum.model.edges import DIRECTIONS, EdgeShift, StraightOn
+from lidaraccum.model.edges import EdgeShift, StraightOn
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.model.tube_net import TubeNet
-from lidaraccum.model.tubes import Tubes, centroid_gap, gather_tubes
+from lidaraccum.model.tubes import DIRECTIONS, Tubes, centroid_gap, gather_tubes
 
 CHANNELS = 16
 VELOCITY = torch.tensor([6.0, 2.0, 0.1])
@@ -57,6 +57,15 @@ def drawn(module: torch.nn.Module, seed: int = 3) -> torch.nn.Module:
     return module
 
 
+def trust_all_alike(edges: EdgeShift) -> None:
+    """And let the first channel of their circumstances through to what decides."""
+    with torch.no_grad():
+        for layer in (edges.told, edges.seen, *edges.trust, edges.centre):
+            for parameter in layer.parameters():
+                parameter.zero_()
+        edges.trust[1].weight[0, 0] = 1.0
+
+
 @pytest.mark.parametrize("tube", ["edges", "centroid"])
 def test_a_fresh_net_knows_how_far_a_car_seen_whole_has_gone(tube: str) -> None:
     settings = NetworkSettings(tube=tube)
@@ -79,13 +88,11 @@ def test_edges_that_are_trusted_outweigh_a_centroid_that_wanders() -> None:
     rear = [one[one[:, 0] < one[:, 0].max() - 0.6 * time] for time, one in enumerate(seen)]
     tubes = tubes_of(rear)
     edges = EdgeShift(CHANNELS)
+    trust_all_alike(edges)
     with torch.no_grad():
-        for layer in (edges.told, edges.seen, *edges.trust, edges.centre):
-            for parameter in layer.parameters():
-                parameter.zero_()
         # What lies along the shift, the third circumstance, is trusted: the rear.
         edges.seen.weight[0, 2] = 1.0
-        edges.trust[1].weight[0, 0] = 1.0
+        edges.seen.weight[0, 9] = -10.0  # and the outermost the rather
         edges.trust[3].weight[0, 0] = 50.0
     shift = edges(tubes, torch.zeros(1, 3, CHANNELS), tubes.relative, torch.zeros(1, 3, 3))
     way = VELOCITY[:2] / VELOCITY[:2].norm()
@@ -94,6 +101,22 @@ def test_edges_that_are_trusted_outweigh_a_centroid_that_wanders() -> None:
     by_centroid = centroid_gap(tubes.relative, tubes)[0, 1:, :2] @ way
     assert (by_edges - wanted).abs().max() < 0.03
     assert (by_centroid - wanted).abs().min() > 0.2
+
+
+@pytest.mark.parametrize(("sign", "errs"), [(-1.0, True), (1.0, False)])
+def test_strays_shift_the_outermost_edge_and_not_what_lies_within(sign: float, errs: bool) -> None:
+    whole = car()
+    strays = whole[:5] + torch.tensor([6.0, 0.0, 0.0])
+    tubes = tubes_of([whole, torch.cat([whole + 0.1 * VELOCITY, strays])])
+    edges = EdgeShift(CHANNELS)
+    trust_all_alike(edges)
+    with torch.no_grad():  # but rather where few of the points lie beyond, or where many do
+        edges.seen.bias[0] = 1.0
+        edges.seen.weight[0, 9] = 100.0 * sign
+        edges.trust[3].weight[0, 0] = 10.0
+        shift = edges(tubes, torch.zeros(1, 2, CHANNELS), tubes.relative, torch.zeros(1, 2, 3))
+    error = (shift[0, 1, :2] + 0.1 * VELOCITY[:2]).norm()
+    assert error > 1.0 if errs else error < 0.06
 
 
 @pytest.mark.parametrize("steps", [1, 4, 7])

@@ -5,20 +5,21 @@ The mean of what is seen of a car wanders over it as it passes; its rear stays w
 
 from __future__ import annotations
 
-import math
-
 import torch
 from torch import nn
 
 from lidaraccum.model.kabsch import compose, move
-from lidaraccum.model.tubes import LENGTH_M, Tubes, centroid_gap
+from lidaraccum.model.tubes import DIRECTIONS, LENGTH_M, Tubes, centroid_gap, directions, ends
 
-DIRECTIONS = 16
-"""In the horizontal plane, evenly about: the outermost point in each is an edge."""
+SHARES = (0.0, 0.03, 0.5)
+"""So many of the points may lie beyond: the outermost has none, strays or a part that comes and
+goes shift the second little, and the last is the middle."""
 
+_AXES = DIRECTIONS // 2
+"""An edge and the one opposite have one."""
+_CIRCUMSTANCES = 10
 _FURTHEST_M = 3.0
 """What one edge says beyond what the centroid says is told up to here."""
-_EMPTY_M = -1e4
 _NEAR_M = 0.1
 """Who went less than about this has no direction of going."""
 _BREATH = 1e-3
@@ -28,29 +29,32 @@ _BREATH = 1e-3
 class EdgeShift(nn.Module):
     """The shift that takes an object's edges at each time to those at its anchor's time.
 
-    Edge k, outermost along n_k, is g_k short of where it is at the anchor's time, so a shift s
-    should have n_k s = g_k; the centroid asks for its own gap, in all directions. The shift is the
-    least-squares answer. How much each counts is learned, the same function for all directions: an
-    edge that is turned away from the sensor, or that others hide, is no edge of the object.
-    Upwards the answer lies between what mean, highest and lowest point say.
+    Edge k, outermost along n_k but for a share of the points, is g_k short of where it is at the
+    anchor's time, so a shift s should have n_k s = g_k; the centroid asks for its own gap, in all
+    directions. The shift is the least-squares answer. How much each counts is learned, the same
+    function for all: an edge that is turned away from the sensor, that others hide, or that is a
+    stray point, is no edge of the object. Upwards the answer lies between what the mean and the
+    same shares from above and below say.
     """
 
-    directions: torch.Tensor
+    ways: torch.Tensor
+    outside: torch.Tensor
 
     def __init__(self, channels: int) -> None:
         super().__init__()
         self.told = nn.Linear(channels, 32)
-        self.seen = nn.Linear(7, 32)
+        self.seen = nn.Linear(_CIRCUMSTANCES, 32)
         last = nn.Linear(32, 1)
         nn.init.normal_(last.weight, std=1e-3)  # all edges alike at first
         self.trust = nn.Sequential(
             nn.ReLU(inplace=True), nn.Linear(32, 32), nn.ReLU(inplace=True), last
         )
         self.centre = nn.Linear(channels, 1)
-        self.height = nn.Linear(channels, 3)
-        angle = torch.arange(DIRECTIONS) * (2.0 * math.pi / DIRECTIONS)
-        ways = torch.stack([torch.cos(angle), torch.sin(angle)], dim=1)
-        self.register_buffer("directions", ways, persistent=False)
+        self.height = nn.Linear(channels, 1 + 2 * len(SHARES))
+        ways = directions().repeat(len(SHARES), 1)
+        self.register_buffer("ways", ways, persistent=False)
+        outside = torch.tensor(SHARES).repeat_interleave(DIRECTIONS)
+        self.register_buffer("outside", outside, persistent=False)
 
     def forward(
         self, tubes: Tubes, said: torch.Tensor, moved: torch.Tensor, gone: torch.Tensor
@@ -64,15 +68,22 @@ class EdgeShift(nn.Module):
             gone: (K, T, 3) metres they were shifted so far.
         """
         gap = centroid_gap(moved, tubes)
-        reach = _outermost(moved[:, :2] @ self.directions.T, tubes)
-        ahead = torch.where((tubes.counts > 0)[..., None], tubes.at_anchor(reach) - reach, 0.0)
+        along = torch.cat([moved[:, :2] @ self.ways[:_AXES].T, moved[:, 2:]], dim=1)
+        above, below = (
+            reached.view(*tubes.counts.shape, len(SHARES), -1)
+            for reached in ends(along, tubes.slot(), tubes.counts.flatten(), SHARES)
+        )
+        reach = torch.cat([above[..., :_AXES], below[..., :_AXES]], dim=3).flatten(2)
+        upward = torch.stack([above[..., -1], -below[..., -1]], dim=3).flatten(2)
+        seen = (tubes.counts > 0)[..., None]
+        ahead = torch.where(seen, tubes.at_anchor(reach) - reach, 0.0)
         circumstances = self._describe(tubes, gap, reach, ahead, gone)
         told = self.told(said)[:, :, None] + self.seen(circumstances)
         trust = torch.cat([self.centre(said), self.trust(told)[..., 0]], dim=2).softmax(dim=2)
-        flat = self._solve(trust, ahead, gap[..., :2])
-        upward = torch.cat([gap[..., 2:], _vertical_gaps(moved[:, 2], tubes)], dim=2)
-        height = (self.height(said).softmax(dim=2) * upward).sum(dim=2, keepdim=True)
-        return torch.cat([flat, height], dim=2)
+        rise = torch.where(seen, tubes.at_anchor(upward) - upward, 0.0)
+        rise = torch.cat([gap[..., 2:], rise], dim=2)
+        height = (self.height(said).softmax(dim=2) * rise).sum(dim=2, keepdim=True)
+        return torch.cat([self._solve(trust, ahead, gap[..., :2]), height], dim=2)
 
     def _describe(
         self,
@@ -82,23 +93,26 @@ class EdgeShift(nn.Module):
         ahead: torch.Tensor,
         gone: torch.Tensor,
     ) -> torch.Tensor:
-        """(K, T, D, 7): what tells whether an edge can be trusted, seen along its direction."""
-        seen = (tubes.counts > 0)[..., None]
-        reach = torch.where(seen, reach, 0.0)
+        """(K, T, E, 10): what tells whether an edge can be trusted, seen along its direction."""
+        by_share = reach.view(*reach.shape[:2], len(SHARES), DIRECTIONS)
+        across = (by_share + torch.roll(by_share, _AXES, dims=3)).flatten(2)
+        depth = (by_share[:, :, :1] - by_share).flatten(2)
         going = gap[..., :2] + gone[..., :2]
         going = going / torch.linalg.vector_norm(going, dim=2, keepdim=True).clamp_min(_NEAR_M)
-        bearing = tubes.bearing() @ self.directions.T
-        across = reach + torch.roll(reach, DIRECTIONS // 2, dims=2)
-        beyond = ahead - gap[..., :2] @ self.directions.T
+        bearing = tubes.bearing() @ self.ways.T
+        beyond = ahead - gap[..., :2] @ self.ways.T
         return torch.stack(
             [
                 beyond.clamp(-_FURTHEST_M, _FURTHEST_M),
                 bearing[:, None].expand_as(reach),
-                going @ self.directions.T,
+                going @ self.ways.T,
                 across / LENGTH_M,
                 reach / LENGTH_M,
                 tubes.plenty()[..., None].expand_as(reach),
                 ahead.clamp(-_FURTHEST_M, _FURTHEST_M),
+                depth / LENGTH_M,
+                tubes.at_anchor(depth).expand_as(reach) / LENGTH_M,
+                self.outside.expand_as(reach),
             ],
             dim=3,
         )
@@ -106,7 +120,7 @@ class EdgeShift(nn.Module):
     def _solve(self, trust: torch.Tensor, ahead: torch.Tensor, gap: torch.Tensor) -> torch.Tensor:
         """(K, T, 2): weighted least squares over the centroid's say and each edge's."""
         centre, edges = trust[..., :1] + _BREATH, trust[..., 1:]
-        ways = self.directions
+        ways = self.ways
         aim = (edges * ahead) @ ways + centre * gap
         xx, xy, yy = (
             edges @ (ways[:, i] * ways[:, j]) + (centre[..., 0] if i == j else 0.0)
@@ -154,17 +168,3 @@ class StraightOn(nn.Module):
         velocity = velocity / ((count * seconds**2).sum(dim=1, keepdim=True) + 1e-6)
         steady = velocity[:, None] * seconds[..., None]
         return shift + drawn[..., None] * (steady - whole)
-
-
-def _outermost(values: torch.Tensor, tubes: Tubes) -> torch.Tensor:
-    """(K, T, D): the largest of an object's values (Q, D) at a time; very low where not seen."""
-    start = values.new_full((tubes.counts.numel(), values.shape[1]), _EMPTY_M)
-    slot = tubes.slot()[:, None].expand_as(values)
-    return start.scatter_reduce(0, slot, values, "amax").view(*tubes.counts.shape, -1)
-
-
-def _vertical_gaps(height: torch.Tensor, tubes: Tubes) -> torch.Tensor:
-    """(K, T, 2) metres from highest and lowest point at each time to those at the anchor's."""
-    ends = _outermost(torch.stack([height, -height], dim=1), tubes)
-    ahead = (tubes.at_anchor(ends) - ends) * ends.new_tensor([1.0, -1.0])
-    return torch.where((tubes.counts > 0)[..., None], ahead, 0.0)

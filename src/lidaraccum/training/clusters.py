@@ -12,6 +12,10 @@ MERGE_REACH_M = 4.0
 """Objects further apart than this are not taken for one."""
 HALO_M = 0.5
 """Background this close to an object's outline is taken for a part of it."""
+STRAY_M = 3.0
+"""Strays come from this far beyond it."""
+STRAYS = 0.03
+"""So many of an object's points at most."""
 
 
 @dataclass(frozen=True)
@@ -23,20 +27,22 @@ class ClusterSettings:
         split: Chance that an object is cut in two.
         thinned: Chance that an object loses a third of its points.
         background: Chance that an object takes along the background about it.
+        strays: Chance that an object takes along a few points that lie apart from it.
     """
 
     merged: float = 0.1
     split: float = 0.15
     thinned: float = 0.25
     background: float = 0.3
+    strays: float = 0.4
 
     def __post_init__(self) -> None:
-        for name in ("merged", "split", "thinned", "background"):
+        for name in ("merged", "split", "thinned", "background", "strays"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise SettingsError(f"{name} is a chance of 0 to 1, not {getattr(self, name)}")
 
 
-TRUE_CLUSTERS = ClusterSettings(0.0, 0.0, 0.0, 0.0)
+TRUE_CLUSTERS = ClusterSettings(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def imperfect_clusters(
@@ -58,9 +64,10 @@ def imperfect_clusters(
     if len(row) == 0 or int(row.max()) < 0:
         return torch.zeros_like(row)
     count = int(row.max()) + 1
-    chance = torch.rand(4, count, generator=generator).to(row.device)
+    chance = torch.rand(6, count, generator=generator).to(row.device)
     angle = (torch.rand(count, generator=generator) * torch.pi).to(row.device)
     lost = torch.rand(len(row), generator=generator).to(row.device) < 1 / 3
+    chosen = torch.rand(len(row), generator=generator).to(row.device)
     has = row >= 0
     centre, radius, home = _outlines(position[has], row[has], window[has], count)
     cluster = row.clone()
@@ -71,9 +78,12 @@ def imperfect_clusters(
     member = cluster.clamp_min(0)
     away = ((position[:, :2] - centre[member]) * _direction(angle)[member]).sum(dim=1)
     cut = (chance[1] < settings.split)[member] & (away > 0) & (cluster >= 0)
+    share = torch.where(chance[4] < settings.strays, STRAYS * chance[5], 0.0)
+    taken = _strays(row, position, window, (centre, radius, home), share, chosen)
     thin = (chance[2] < settings.thinned)[member] & lost
     cluster = torch.where(cut, cluster + count, cluster)
-    return torch.where(thin, -1, cluster) + 1
+    cluster = torch.where(thin, -1, cluster)
+    return torch.where(taken >= 0, taken, cluster) + 1
 
 
 def truth_of_clusters(
@@ -107,6 +117,30 @@ def _outlines(
     radius = away.new_zeros(count).scatter_reduce(0, row, away, "amax")
     home = torch.full((count,), -1, dtype=window.dtype, device=window.device)
     return centre, radius, home.index_copy(0, row, window)
+
+
+def _strays(
+    row: torch.Tensor,
+    position: torch.Tensor,
+    window: torch.Tensor,
+    outlines: tuple[torch.Tensor, torch.Tensor, torch.Tensor],
+    share: torch.Tensor,
+    chosen: torch.Tensor,
+) -> torch.Tensor:
+    """Objects (Q,) that take points which are not theirs, -1 for none.
+
+    Each takes about ``share`` (K,) of the number of its own; ``chosen`` (Q,) decides.
+    """
+    centre, radius, home = outlines
+    apart = torch.cdist(position[:, :2], centre)
+    reachable = (window[:, None] == home) & (apart < radius + STRAY_M) & (share > 0.0)
+    reachable &= row[:, None] != torch.arange(len(centre), device=row.device)
+    distance, nearest = apart.masked_fill(~reachable, torch.inf).min(dim=1)
+    offered = torch.isfinite(distance)
+    count = torch.bincount(nearest[offered], minlength=len(centre)).clamp_min(1)
+    size = torch.bincount(row[row >= 0], minlength=len(centre))
+    chance = share * size / count
+    return torch.where(offered & (chosen < chance[nearest]), nearest, -1)
 
 
 def _merge(
