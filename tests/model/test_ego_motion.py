@@ -23,8 +23,11 @@ TRUTH = torch.tensor(
 
 
 def pillars(position: torch.Tensor, feature: torch.Tensor) -> EgoPillars:
+    """Of one frame, which saw no ground."""
+    every = torch.ones(1, len(position)).bool()
+    ground = position[None, :0]
     return EgoPillars(
-        position[None], feature[None], torch.ones(1, len(position)).bool(), torch.eye(4)[None]
+        position[None], feature[None], every, ground, every[:, :0], torch.eye(4)[None]
     )
 
 

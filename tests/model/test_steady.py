@@ -57,7 +57,9 @@ def test_where_all_looks_alike_a_good_start_decides() -> None:
     seen = move(invert(true), poles[None])
     alike = torch.ones(1, len(poles), 4) / 2.0
     valid, level = torch.ones(1, len(poles), dtype=torch.bool), torch.eye(4)[None]
-    source, target = (EgoPillars(p, alike, valid, level) for p in (seen, poles[None]))
+    source, target = (
+        EgoPillars(p, alike, valid, p[:, :0], valid[:, :0], level) for p in (seen, poles[None])
+    )
     matcher = Matcher(settings)
     start = true.clone()
     start[:, 0, 3] += 0.6

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from lidaraccum.model.motion import Windows
-from lidaraccum.model.network import Network, build_network
+from lidaraccum.model.network import FrameFeatures, Network, build_network
 from lidaraccum.training.ablations import PARTS, chained_poses, score_without
 from lidaraccum.training.stages import score_stages
 from lidaraccum.training.window import Batch, make_batch
@@ -56,7 +56,11 @@ def test_two_frames_are_chained_as_they_are_matched(eager: Network, batch: Batch
         features = eager.encode(batch.frames)
         chained = chained_poses(eager, features)
         direct = eager.match_windows(features, batch.windows).target_from_source
+        two = FrameFeatures.stack([features.select(0), features.select(1)])
+        step = chained_poses(eager, two)
+        straight = eager.match_windows(two, Windows.single(2)).target_from_source
     assert chained.shape == direct.shape
+    assert torch.equal(step, straight)
     torch.testing.assert_close(chained[0], direct[0], atol=1e-5, rtol=0)
     if len(direct) > 1:
         assert not torch.equal(chained[1], direct[1])

@@ -12,13 +12,17 @@ from torch import nn
 from lidaraccum.model.batch import FrameTensors
 from lidaraccum.model.convolution import Convolution
 from lidaraccum.model.kabsch import exactly, fit_rigid, invert, move
+from lidaraccum.model.levelling import levelled
+from lidaraccum.model.partners import drawn_to, spread
 from lidaraccum.model.settings import NetworkSettings
-from lidaraccum.model.sinkhorn import sinkhorn
+from lidaraccum.model.sinkhorn import SoftMatches, sinkhorn
 
 SHARPEST = 0.02
 _LEAST_REACH_M = 1.0
 STANDING_M = 0.3
 """Pillars whose points lie this high above ground, on average, stand out of it."""
+LOW_M = 0.2
+"""Pillars whose points lie no higher, nor deeper, are the ground's."""
 
 
 _Kind = TypeVar("_Kind", bound="_Rows")
@@ -41,18 +45,22 @@ class _Rows:
 
 @dataclass(frozen=True, eq=False)
 class EgoPillars(_Rows):
-    """The N background pillars that speak for each of F frames.
+    """The N background pillars that speak for each of F frames, and G of its ground.
 
     Attributes:
         position: (F, N, 3) float32, metres: mean of the pillar's points, level coordinates.
         feature: (F, N, E) unit vectors.
         valid: (F, N) bool: False where the frame has too little background.
+        ground: (F, G, 3) metres: means of the ground's pillars, level coordinates.
+        on_ground: (F, G) bool: False where the frame has too little ground.
         level_from_sensor: (F, 4, 4).
     """
 
     position: torch.Tensor
     feature: torch.Tensor
     valid: torch.Tensor
+    ground: torch.Tensor
+    on_ground: torch.Tensor
     level_from_sensor: torch.Tensor
 
     @classmethod
@@ -61,7 +69,8 @@ class EgoPillars(_Rows):
         shape = (len(level_from_sensor), 0)
         position = level_from_sensor.new_zeros(*shape, 3)
         feature = level_from_sensor.new_zeros(*shape, channels)
-        return cls(position, feature, position[..., 0].bool(), level_from_sensor)
+        nowhere = position[..., 0].bool()
+        return cls(position, feature, nowhere, position, nowhere, level_from_sensor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,8 +149,29 @@ def choose_background(
     key = _hash(frames.pillar_cell + 65536 * 7 * points[owner] + 1_000_003 * seed)
     odds = torch.where(frames.pillar_height > STANDING_M, standing_odds, 1.0)
     key = key ** (1.0 / odds)  # drawn by odds without putting back (Efraimidis and Spirakis, 2006)
-    key = (1.0 - key) + (foreground > 0) + 2.0 * owner  # background below 1, foreground above
-    order = torch.argsort(key)
+    return _first(frames, 1.0 - key, foreground <= 0, count)
+
+
+def choose_ground(
+    frames: FrameTensors, foreground: torch.Tensor, count: int
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Draw pillars of each frame's ground by lot: indices and validity (F, count).
+
+    Args:
+        frames: F frames with V pillars.
+        foreground: (V,) logits; above 0 is no ground.
+        count: Pillars a frame.
+    """
+    low = (frames.pillar_height.abs() < LOW_M) & (foreground <= 0)
+    return _first(frames, _hash(frames.pillar_cell), low, count)
+
+
+def _first(
+    frames: FrameTensors, key: torch.Tensor, suits: torch.Tensor, count: int
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Of each frame's pillars the first by key (V,), 0..1: indices, and whether they suit."""
+    owner = frames.pillar_frame
+    order = torch.argsort(key + ~suits + 2.0 * owner)  # what suits below 1, the rest above
     starts = torch.tensor((0, *frames.pillar_counts[:-1]), device=owner.device).cumsum(0)
     rank = torch.arange(len(order), device=owner.device) - starts[owner]
     kept = order[rank < count]
@@ -149,7 +179,7 @@ def choose_background(
     valid = torch.zeros(len(frames), count, dtype=torch.bool, device=owner.device)
     slot = owner[rank < count] * count + rank[rank < count]
     index.view(-1)[slot] = kept
-    valid.view(-1)[slot] = foreground[kept] <= 0
+    valid.view(-1)[slot] = suits[kept]
     return index, valid
 
 
@@ -171,6 +201,9 @@ class Matcher(nn.Module):
 
     Source: the paper, section 3.2 and supplement; the affinity's form from METHOD.md; matching in
     rounds as RPM-Net (Yew and Lee, CVPR 2020).
+
+    Also ours: how high the source lies, and how level, is what the ground says. Pillars that stand
+    out of it tell the way, but the mean height of a wall's points is the beams' that met it.
     """
 
     def __init__(self, settings: NetworkSettings) -> None:
@@ -207,7 +240,9 @@ class Matcher(nn.Module):
                 near = torch.zeros_like(apart).masked_fill_(
                     impossible | (apart > reach[:, None, None]), -torch.inf
                 )
-                motion, row_mass, column_mass = self._fit(source, target, near, 0)
+                matches = self._match(source, target, near, 0)
+                partner, row_mass = _partners(matches, target)
+                motion = fit_rigid(source.position, partner, row_mass)
             else:
                 motion = start
             rounds = [motion]
@@ -220,8 +255,18 @@ class Matcher(nn.Module):
                 near = (-2.0 * (apart / near_m) ** 2).masked_fill_(
                     impossible | (apart > near_m), -torch.inf
                 )
-                motion, row_mass, column_mass = self._fit(source, target, near, min(number, last))
+                matches = self._match(source, target, near, min(number, last))
+                partner, row_mass = _partners(matches, target)
+                if number <= last:
+                    motion = fit_rigid(source.position, partner, row_mass)
+                else:
+                    covariance = spread(matches, target.position, row_mass)
+                    motion = drawn_to(motion, source.position, partner, covariance, row_mass)
+                    motion = levelled(
+                        motion, source.ground, source.on_ground, target.ground, target.on_ground
+                    )
                 rounds.append(motion)
+            column_mass = matches.column_mass()
             sensor = invert(target.level_from_sensor) @ motion @ source.level_from_sensor
         return EgoMatch(
             target_from_source=sensor,
@@ -234,13 +279,10 @@ class Matcher(nn.Module):
             rounds=torch.stack(rounds, dim=1),
         )
 
-    def _fit(
+    def _match(
         self, source: EgoPillars, target: EgoPillars, near: torch.Tensor, number: int
-    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """The motion (B, 4, 4) between level coordinates, and the masses (B, N) behind it.
-
-        ``near`` (B, N, N) is what their places add to the pillars' affinities.
-        """
+    ) -> SoftMatches:
+        """Matches (B, N, N); ``near`` (B, N, N) is what places add to pillars' affinities."""
         slack = nn.functional.softplus(self.offset[number])
         sharpness = 1.0 / (torch.exp(self.scale[number]) + SHARPEST)
         # The affinity is (slack - |f - g|^2) times the sharpness, and |f - g|^2 = 2 - 2 f g; the
@@ -248,9 +290,12 @@ class Matcher(nn.Module):
         constant = ((slack - 2.0) * sharpness).expand_as(source.feature[..., :1])
         mine = torch.cat([2.0 * sharpness * source.feature, constant], dim=2)
         theirs = torch.cat([target.feature, torch.ones_like(target.feature[..., :1])], dim=2)
-        matches = sinkhorn(mine @ theirs.transpose(1, 2) + near, self.sinkhorn_rounds)
-        position = torch.cat([target.position, torch.ones_like(target.position[..., :1])], dim=2)
-        carried = matches.carry(position)
-        row_mass = carried[..., 3]
-        partner = carried[..., :3] / row_mass.clamp_min(1e-6)[..., None]
-        return fit_rigid(source.position, partner, row_mass), row_mass, matches.column_mass()
+        return sinkhorn(mine @ theirs.transpose(1, 2) + near, self.sinkhorn_rounds)
+
+
+def _partners(matches: SoftMatches, target: EgoPillars) -> tuple[torch.Tensor, torch.Tensor]:
+    """Where what rows are matched with lies, on average: (B, N, 3) metres, and masses (B, N)."""
+    position = torch.cat([target.position, torch.ones_like(target.position[..., :1])], dim=2)
+    carried = matches.carry(position)
+    mass = carried[..., 3]
+    return carried[..., :3] / mass.clamp_min(1e-6)[..., None], mass

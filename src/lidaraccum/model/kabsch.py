@@ -107,6 +107,14 @@ def about(motion: torch.Tensor, centre: torch.Tensor) -> torch.Tensor:
         return compose(rotation, shift)
 
 
+def cross_matrix(vectors: torch.Tensor) -> torch.Tensor:
+    """(..., 3, 3): the matrices that cross these vectors (..., 3) with what they multiply."""
+    x, y, z = vectors.unbind(dim=-1)
+    zero = torch.zeros_like(x)
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return torch.stack([torch.stack(row, dim=-1) for row in rows], dim=-2)
+
+
 def exactly(tensor: torch.Tensor) -> AbstractContextManager[object]:
     """Motions are computed as they are given, whatever the precision around: 8 bits lose metres."""
     return torch.autocast(tensor.device.type, enabled=False)

@@ -10,7 +10,14 @@ import torch
 from torch import nn
 
 from lidaraccum.model.batch import FrameTensors
-from lidaraccum.model.ego_motion import EgoHead, EgoMatch, EgoPillars, Matcher, choose_background
+from lidaraccum.model.ego_motion import (
+    EgoHead,
+    EgoMatch,
+    EgoPillars,
+    Matcher,
+    choose_background,
+    choose_ground,
+)
 from lidaraccum.model.kabsch import about, chain, invert, move
 from lidaraccum.model.motion import MotionMap, PointHead, Windows, read
 from lidaraccum.model.pillars import PillarEncoder
@@ -209,7 +216,15 @@ class Network(nn.Module):
         owner = torch.arange(len(frames), device=index.device)[:, None].expand_as(index)
         cell = frames.pillar_cell[index]
         feature = self.ego_head(base, owner.reshape(-1), cell.reshape(-1)).view(*index.shape, -1)
-        return EgoPillars(frames.pillar_mean[index], feature, valid, frames.level_from_sensor)
+        low, on_ground = choose_ground(frames, foreground, self.settings.ground_pillars)
+        return EgoPillars(
+            position=frames.pillar_mean[index],
+            feature=feature,
+            valid=valid,
+            ground=frames.pillar_mean[low],
+            on_ground=on_ground,
+            level_from_sensor=frames.level_from_sensor,
+        )
 
     def match_windows(self, features: FrameFeatures, windows: Windows) -> EgoMatch:
         """Each source frame straight to its window's target, in the frames' order.

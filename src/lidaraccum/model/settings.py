@@ -9,7 +9,7 @@ from lidaraccum.errors import SettingsError
 COARSEST_CELLS = 16
 """Grid sides are multiples of this, so that every level of both U-Nets halves evenly."""
 
-EFFORT = ("extent_m", "pillar_points", "ego_pillars", "finer_m")
+EFFORT = ("extent_m", "pillar_points", "ego_pillars", "ground_pillars", "finer_m")
 """Settings that say how much is looked at. Weights fit any, best those they learned with."""
 
 
@@ -30,6 +30,7 @@ class NetworkSettings:
             the first is that of the base features.
         ego_channels: Channels of the ego features.
         ego_pillars: Background pillars matched in each frame.
+        ground_pillars: Pillars of the ground that tell how high and how level each frame lies.
         standing_odds: How much rather than the road, which looks alike everywhere but of which
             there is far more, a pillar that stands out of it is drawn to be matched.
         slack_start: Where the slack of the pillars' affinity starts, before softplus.
@@ -63,6 +64,7 @@ class NetworkSettings:
     base_widths: tuple[int, ...] = (32, 64, 128, 192, 256)
     ego_channels: int = 64
     ego_pillars: int = 1024
+    ground_pillars: int = 4096
     standing_odds: float = 16.0
     slack_start: float = -1.0
     scale_start: float = -3.0

@@ -36,6 +36,10 @@ class SoftMatches:
         """How far each column is matched: (B, M), 0..1."""
         return self.column * (self.row[:, None] @ self.kernel)[:, 0]
 
+    def double(self) -> SoftMatches:
+        """The same in float64."""
+        return SoftMatches(self.kernel.double(), self.row.double(), self.column.double())
+
     def dense(self) -> torch.Tensor:
         """All matches (B, N, M)."""
         return self.kernel * self.row[..., None] * self.column[:, None]
