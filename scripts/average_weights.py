@@ -1,9 +1,10 @@
 """Averages the weights of runs that began from the same weights: better than each, at no cost.
 
-Usage: average_weights.py WEIGHTS WEIGHTS... -o OUT [--ego-pillars N]
+Usage: average_weights.py WEIGHTS WEIGHTS... -o OUT [--ego-pillars N] [--tubes WEIGHTS]
 
 Source: Wortsman et al., "Model soups" (ICML 2022). The runs may differ in seed and recipe, the
-networks only in how many pillars they match: the mean as many as the first, or as it is told.
+networks only in how many pillars they match: the mean as many as the first, or as it is told. And
+in TubeNet, where one is named whose TubeNet the mean is to have.
 """
 
 from __future__ import annotations
@@ -24,20 +25,27 @@ def main() -> None:
     parser.add_argument("weights", nargs="+", type=Path)
     parser.add_argument("-o", "--output", required=True, type=Path)
     parser.add_argument("--ego-pillars", type=int, help="background pillars matched in a frame")
+    parser.add_argument("--tubes", type=Path, help="weights whose TubeNet the mean is to have")
     options = parser.parse_args()
     networks = [load_network(path) for path in options.weights]
-    mean = networks[0]
-    count = options.ego_pillars or mean.settings.ego_pillars
-    settings = {replace(network.settings, ego_pillars=count) for network in networks}
+    mean = load_network(options.tubes) if options.tubes else networks[0]
+    count = options.ego_pillars or networks[0].settings.ego_pillars
+    tube = {"tube": mean.settings.tube} if options.tubes else {}
+    settings = {
+        replace(network.settings, ego_pillars=count, **tube) for network in [mean, *networks]
+    }
     if len(settings) > 1:
         parser.error("the networks differ in their settings")
     mean.settings = settings.pop()
     others = [dict(network.named_parameters()) for network in networks]
     with torch.no_grad():
         for name, values in mean.named_parameters():
-            values.copy_(torch.stack([other[name] for other in others]).mean(dim=0))
-    parts = ", ".join(weights_hash(path)[:12] for path in options.weights)
-    save_network(mean, options.output, {"mean_of": parts})
+            if options.tubes is None or not name.startswith("tube_net."):
+                values.copy_(torch.stack([other[name] for other in others]).mean(dim=0))
+    notes = {"mean_of": ", ".join(weights_hash(path)[:12] for path in options.weights)}
+    if options.tubes:
+        notes["tubes_of"] = weights_hash(options.tubes)[:12]
+    save_network(mean, options.output, notes)
 
 
 if __name__ == "__main__":

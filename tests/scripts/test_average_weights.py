@@ -53,6 +53,23 @@ def test_it_matches_as_many_pillars_as_the_first_or_as_it_is_told(
     assert load_network(tmp_path / "mean.safetensors").settings.ego_pillars == count
 
 
+def test_it_may_have_the_tube_net_of_others(files: list[Path], tmp_path: Path) -> None:
+    """Of another kind than those of the weights that are averaged."""
+    old = tmp_path / "old.safetensors"
+    save_network(build_network(replace(SMALL, tube="centroid"), 5), old)
+    mean = tmp_path / "mean.safetensors"
+    assert average(files[0], old, output=mean).returncode != 0
+    done = average(files[0], old, output=mean, more=("--tubes", str(files[1])))
+    assert done.returncode == 0, done.stderr
+    got, tubes, one, two = (
+        dict(load_network(path).named_parameters()) for path in (mean, files[1], files[0], old)
+    )
+    assert got.keys() == tubes.keys()
+    for name, values in got.items():
+        own = name.startswith("tube_net.")
+        torch.testing.assert_close(values, tubes[name] if own else (one[name] + two[name]) / 2)
+
+
 def test_other_networks_are_refused(files: list[Path], tmp_path: Path) -> None:
     save_network(build_network(replace(SMALL, pillar_points=3)), files[0])
     done = average(*files, output=tmp_path / "mean.safetensors")
