@@ -8,10 +8,10 @@ import pytest
 import torch
 
 from lidaraccum.errors import SettingsError
-from lidaraccum.model.edges import EdgeShift, StraightOn
+from lidaraccum.model.edges import DIRECTIONS, EdgeShift, StraightOn
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.model.tube_net import TubeNet
-from lidaraccum.model.tubes import DIRECTIONS, Tubes, centroid_gap, gather_tubes
+from lidaraccum.model.tubes import Tubes, centroid_gap, gather_tubes
 
 CHANNELS = 16
 VELOCITY = torch.tensor([6.0, 2.0, 0.1])

@@ -5,12 +5,17 @@ The mean of what is seen of a car wanders over it as it passes; its rear stays w
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import torch
 from torch import nn
 
 from lidaraccum.model.kabsch import compose, move
-from lidaraccum.model.tubes import DIRECTIONS, LENGTH_M, Tubes, centroid_gap, directions, ends
+from lidaraccum.model.tubes import LENGTH_M, Tubes, centroid_gap
 
+DIRECTIONS = 16
+"""Of the horizontal plane, evenly about, in which objects have edges."""
 SHARES = (0.0, 0.03, 0.5)
 """So many of the points may lie beyond: the outermost has none, strays or a part that comes and
 goes shift the second little, and the last is the middle."""
@@ -51,7 +56,7 @@ class EdgeShift(nn.Module):
         )
         self.centre = nn.Linear(channels, 1)
         self.height = nn.Linear(channels, 1 + 2 * len(SHARES))
-        ways = directions().repeat(len(SHARES), 1)
+        ways = _directions().repeat(len(SHARES), 1)
         self.register_buffer("ways", ways, persistent=False)
         outside = torch.tensor(SHARES).repeat_interleave(DIRECTIONS)
         self.register_buffer("outside", outside, persistent=False)
@@ -71,7 +76,7 @@ class EdgeShift(nn.Module):
         along = torch.cat([moved[:, :2] @ self.ways[:_AXES].T, moved[:, 2:]], dim=1)
         above, below = (
             reached.view(*tubes.counts.shape, len(SHARES), -1)
-            for reached in ends(along, tubes.slot(), tubes.counts.flatten(), SHARES)
+            for reached in _ends(along, tubes.slot(), tubes.counts.flatten(), SHARES)
         )
         reach = torch.cat([above[..., :_AXES], below[..., :_AXES]], dim=3).flatten(2)
         upward = torch.stack([above[..., -1], -below[..., -1]], dim=3).flatten(2)
@@ -168,3 +173,37 @@ class StraightOn(nn.Module):
         velocity = velocity / ((count * seconds**2).sum(dim=1, keepdim=True) + 1e-6)
         steady = velocity[:, None] * seconds[..., None]
         return shift + drawn[..., None] * (steady - whole)
+
+
+def _directions() -> torch.Tensor:
+    """(DIRECTIONS, 2) unit vectors, evenly about; the second half is opposite the first."""
+    angle = torch.arange(DIRECTIONS) * (2.0 * math.pi / DIRECTIONS)
+    return torch.stack([torch.cos(angle), torch.sin(angle)], dim=1)
+
+
+def _ends(
+    values: torch.Tensor, slot: torch.Tensor, counts: torch.Tensor, shares: Sequence[float]
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """How far values (Q, A) of each slot reach, upwards and downwards: twice (S, R, A).
+
+    Args:
+        values: (Q, A).
+        slot: (Q,) int64, 0..S-1.
+        counts: (S,) int64 of values in each; where there are none the answer is 0.
+        shares: R shares of a slot's values that may lie beyond.
+    """
+    if len(slot) == 0:
+        nothing = values.new_zeros(len(counts), len(shares), values.shape[1])
+        return nothing, nothing
+    # Objects lie within kilometres: one number sorts by slot, then by value.
+    order = torch.argsort(values.T.double() + 1e5 * slot, dim=1)
+    ranked = values.T.gather(1, order)
+    last = torch.cumsum(counts, dim=0)[:, None] - 1
+    beyond = (counts[:, None] * counts.new_tensor(shares, dtype=torch.float64)).floor().long()
+    upper, lower = last - beyond, last - counts[:, None] + 1 + beyond
+    seen = (counts > 0)[:, None, None]
+    above, below = (
+        torch.where(seen, sign * ranked[:, index.clamp(0, len(slot) - 1)].permute(1, 2, 0), 0.0)
+        for index, sign in ((upper, 1.0), (lower, -1.0))
+    )
+    return above, below

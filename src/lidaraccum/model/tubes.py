@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -12,8 +10,6 @@ from lidaraccum.model.kabsch import move
 
 LENGTH_M = 4.0
 """About that of a car: positions are told in it."""
-DIRECTIONS = 16
-"""Of the horizontal plane, evenly about, in which objects have edges."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,40 +117,6 @@ def centroid_gap(moved: torch.Tensor, tubes: Tubes) -> torch.Tensor:
     sums = moved.new_zeros(tubes.counts.numel(), 3).index_add(0, tubes.slot(), moved)
     mean = sums.view(*tubes.counts.shape, 3) / tubes.counts.clamp_min(1)[..., None]
     return torch.where(tubes.counts[..., None] > 0, tubes.at_anchor(mean) - mean, 0.0)
-
-
-def directions() -> torch.Tensor:
-    """(DIRECTIONS, 2) unit vectors, evenly about; the second half is opposite the first."""
-    angle = torch.arange(DIRECTIONS) * (2.0 * math.pi / DIRECTIONS)
-    return torch.stack([torch.cos(angle), torch.sin(angle)], dim=1)
-
-
-def ends(
-    values: torch.Tensor, slot: torch.Tensor, counts: torch.Tensor, shares: Sequence[float]
-) -> tuple[torch.Tensor, torch.Tensor]:
-    """How far values (Q, A) of each slot reach, upwards and downwards: twice (S, R, A).
-
-    Args:
-        values: (Q, A).
-        slot: (Q,) int64, 0..S-1.
-        counts: (S,) int64 of values in each; where there are none the answer is 0.
-        shares: R shares of a slot's values that may lie beyond.
-    """
-    if len(slot) == 0:
-        nothing = values.new_zeros(len(counts), len(shares), values.shape[1])
-        return nothing, nothing
-    # Objects lie within kilometres: one number sorts by slot, then by value.
-    order = torch.argsort(values.T.double() + 1e5 * slot, dim=1)
-    ranked = values.T.gather(1, order)
-    last = torch.cumsum(counts, dim=0)[:, None] - 1
-    beyond = (counts[:, None] * counts.new_tensor(shares, dtype=torch.float64)).floor().long()
-    upper, lower = last - beyond, last - counts[:, None] + 1 + beyond
-    seen = (counts > 0)[:, None, None]
-    above, below = (
-        torch.where(seen, sign * ranked[:, index.clamp(0, len(slot) - 1)].permute(1, 2, 0), 0.0)
-        for index, sign in ((upper, 1.0), (lower, -1.0))
-    )
-    return above, below
 
 
 def move_points(total: torch.Tensor, tubes: Tubes) -> torch.Tensor:
