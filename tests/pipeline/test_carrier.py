@@ -46,3 +46,11 @@ def test_rails_on_both_sides_do_not_go_along_with_the_carrier() -> None:
     (network,) = evaluate([simulate(held_out_settings(155, 5))], settings).methods
     assert network.scores.motion.false_positive == 0
     assert network.scores.flow.static.epe_mean < 0.03
+
+
+def test_a_car_that_keeps_pace_behind_does_not_go_with_the_carrier() -> None:
+    """What beams meet of the road about the sensor was joined with it, and both dropped."""
+    settings = EvaluationSettings(methods=("network",), weights=shipped_weights())
+    (network,) = evaluate([simulate(held_out_settings(10, 5))], settings).methods
+    assert network.scores.motion.recall > 0.95
+    assert network.scores.flow.dynamic.epe_mean < 0.1

@@ -98,8 +98,16 @@ def find_objects(
                 meant = (_outlined if is_sure else _meant)(found, lead, frames)
                 movers = _settle([meant], movers, frames, settings, SURE_SHARE)
     sure = [lead for lead, _ in looked if lead.trust >= LIKELY]
-    whole = complete(join_parts(movers, frames, settings), sure, frames, settings)
-    return [_filled(one, frames) for one in whole if not is_carrier(one, frames, settings)]
+    # Before parts are joined too: what keeps pace with the carrier would go with it.
+    others = _without_carrier(movers, frames, settings)
+    whole = complete(join_parts(others, frames, settings), sure, frames, settings)
+    return [_filled(one, frames) for one in _without_carrier(whole, frames, settings)]
+
+
+def _without_carrier(
+    movers: Sequence[WindowObject], frames: Sequence[SightedFrame], settings: MotionSettings
+) -> list[WindowObject]:
+    return [one for one in movers if not is_carrier(one, frames, settings)]
 
 
 def _filled(one: WindowObject, frames: Sequence[SightedFrame]) -> WindowObject:
