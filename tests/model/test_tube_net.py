@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import torch
 
 from lidaraccum.errors import SettingsError
+from lidaraccum.geometry import rigid
 from lidaraccum.model.edges import DIRECTIONS, EdgeShift, StraightOn
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.model.tube_net import TubeNet
@@ -36,16 +38,10 @@ def tubes_of(seen: list[torch.Tensor], turn: torch.Tensor | None = None) -> Tube
 
 def about_z(steps: int) -> torch.Tensor:
     """(3, 3) a turn by so many of the edges' directions."""
-    angle = torch.tensor(2.0 * torch.pi * steps / DIRECTIONS)
-    cos, sin = torch.cos(angle), torch.sin(angle)
-    zero, one = torch.zeros(()), torch.ones(())
-    return torch.stack(
-        [
-            torch.stack([cos, -sin, zero]),
-            torch.stack([sin, cos, zero]),
-            torch.stack([zero, zero, one]),
-        ]
-    )
+    angle = 2.0 * np.pi * steps / DIRECTIONS
+    return torch.from_numpy(
+        rigid.exponential(np.array([0.0, 0.0, angle, 0.0, 0.0, 0.0]))[:3, :3]
+    ).float()
 
 
 def drawn(module: torch.nn.Module, seed: int = 3) -> torch.nn.Module:

@@ -131,14 +131,10 @@ def _strays(
 
     Each takes about ``share`` (K,) of the number of its own; ``chosen`` (Q,) decides.
     """
-    centre, radius, home = outlines
-    apart = torch.cdist(position[:, :2], centre)
-    reachable = (window[:, None] == home) & (apart < radius + STRAY_M) & (share > 0.0)
-    reachable &= row[:, None] != torch.arange(len(centre), device=row.device)
-    distance, nearest = apart.masked_fill(~reachable, torch.inf).min(dim=1)
-    offered = torch.isfinite(distance)
-    count = torch.bincount(nearest[offered], minlength=len(centre)).clamp_min(1)
-    size = torch.bincount(row[row >= 0], minlength=len(centre))
+    nearest = _nearest_in_reach(position, row, window, outlines, STRAY_M, share > 0.0)
+    offered = nearest >= 0
+    count = torch.bincount(nearest[offered], minlength=len(share)).clamp_min(1)
+    size = torch.bincount(row[row >= 0], minlength=len(share))
     chance = share * size / count
     return torch.where(offered & (chosen < chance[nearest]), nearest, -1)
 
@@ -165,12 +161,27 @@ def _swallow_background(
     eager: torch.Tensor,
 ) -> torch.Tensor:
     """Background within the halo of eager objects joins them."""
-    centre, radius, home = outlines
     loose = torch.nonzero(cluster < 0)[:, 0]
     if len(loose) == 0:
         return cluster
-    apart = torch.cdist(position[loose, :2], centre)
-    reachable = (window[loose][:, None] == home[None]) & (apart < radius + HALO_M) & eager
-    distance, nearest = apart.masked_fill(~reachable, torch.inf).min(dim=1)
-    joins = torch.where(torch.isfinite(distance), nearest, -1)
+    joins = _nearest_in_reach(
+        position[loose], cluster[loose], window[loose], outlines, HALO_M, eager
+    )
     return cluster.index_copy(0, loose, joins)
+
+
+def _nearest_in_reach(
+    position: torch.Tensor,
+    row: torch.Tensor,
+    window: torch.Tensor,
+    outlines: tuple[torch.Tensor, torch.Tensor, torch.Tensor],
+    beyond_m: float,
+    eager: torch.Tensor,
+) -> torch.Tensor:
+    """The nearest eager object (Q,) whose outline is so near and which is not ``row``; else -1."""
+    centre, radius, home = outlines
+    apart = torch.cdist(position[:, :2], centre)
+    reachable = (window[:, None] == home) & (apart < radius + beyond_m) & eager
+    reachable &= row[:, None] != torch.arange(len(centre), device=row.device)
+    distance, nearest = apart.masked_fill(~reachable, torch.inf).min(dim=1)
+    return torch.where(torch.isfinite(distance), nearest, -1)

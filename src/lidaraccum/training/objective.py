@@ -251,32 +251,29 @@ def _object_loss(
     settings: ObjectiveSettings,
     generator: torch.Generator,
 ) -> torch.Tensor:
-    draws = [
-        _loss_of_clusters(network, perception, truth, aligned_from_object, settings, generator)
-        for _ in range(settings.cluster_draws)
-    ]
+    row = truth.object_row[perception.point]
+    window = torch.tensor(perception.windows.of_frame, device=row.device)[perception.frame]
+    draws = []
+    for _ in range(settings.cluster_draws):
+        cluster = imperfect_clusters(perception.position, row, window, settings.clusters, generator)
+        tracked = _track(network, perception, cluster, row)
+        if tracked is None:
+            draws.append(perception.feature.sum() * 0.0)
+        else:
+            objects, owner = tracked
+            motion, weight = object_truth(objects, truth, aligned_from_object, owner)
+            draws.append(object_loss(objects, motion, weight, settings.rotation_weight))
     return torch.stack(draws).mean()
 
 
-def _loss_of_clusters(
-    network: Network,
-    perception: Perception,
-    truth: Truth,
-    aligned_from_object: torch.Tensor,
-    settings: ObjectiveSettings,
-    generator: torch.Generator,
-) -> torch.Tensor:
-    row = truth.object_row[perception.point]
-    window = torch.tensor(perception.windows.of_frame, device=row.device)[perception.frame]
-    cluster = imperfect_clusters(perception.position, row, window, settings.clusters, generator)
+def _track(
+    network: Network, perception: Perception, cluster: torch.Tensor, row: torch.Tensor
+) -> tuple[ObjectMotions, torch.Tensor] | None:
+    """Motions of K clusters (Q,) that are mostly some object, and its row (K,); None if none is."""
     ids, owner = truth_of_clusters(cluster, row)
     cluster = torch.where(torch.isin(cluster, ids[owner >= 0]), cluster, 0)
     owner = owner[owner >= 0]
-    if len(owner) == 0:
-        return perception.feature.sum() * 0.0
-    objects = network.track(perception, cluster)
-    motion, weight = object_truth(objects, truth, aligned_from_object, owner)
-    return object_loss(objects, motion, weight, settings.rotation_weight)
+    return (network.track(perception, cluster), owner) if len(owner) else None
 
 
 def object_truth(
