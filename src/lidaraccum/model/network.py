@@ -18,18 +18,15 @@ from lidaraccum.model.ego_motion import (
     choose_background,
     choose_ground,
 )
-from lidaraccum.model.kabsch import about, chain, invert, move
-from lidaraccum.model.motion import MotionMap, PointHead, Windows, read
+from lidaraccum.model.kabsch import about, chain, invert
+from lidaraccum.model.looking import View, speakers_of
+from lidaraccum.model.motion import MotionMap, PointHead, Windows
 from lidaraccum.model.pillars import PillarEncoder
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.model.steady import outward, steady
 from lidaraccum.model.tube_net import TubeMotions, TubeNet
 from lidaraccum.model.tubes import Tubes, gather_tubes
 from lidaraccum.model.unet import UNet, channels_last, convolution, to_one_channel
-
-FOREGROUND_GATE = -1.0
-"""Points are looked at closely when their pillar's foreground logit is above this (0.27): the
-second look takes back what is not, but cannot bring in what the first passed over."""
 
 MOST_POINTS = 200_000
 """So many points of a window are looked at closely by those who bound their time: dense sensors,
@@ -265,13 +262,13 @@ class Network(nn.Module):
         most: int = 0,
         detach: bool = False,
     ) -> Perception:
-        """Motion and offsets of the points in foreground pillars.
+        """Motion and offsets of the points that seem to be on something that can move.
 
         Args:
             features: Of all frames of all windows, window by window, in order of time.
             target_from_frame: (F, 4, 4) poses, sensor coordinates: the caller's.
             windows: Which frames make which window.
-            points: (Q,) int64, ascending: the points to look at; `close_points` when None.
+            points: (Q,) int64, ascending: the points to look at; `View.choose` of them when None.
             most: Read about so many; of more, every second or third of a pillar, which speaks for
                 those above it up to the next. 0 for all.
             detach: Keep the motion branch's gradient out of the base features.
@@ -285,53 +282,23 @@ class Network(nn.Module):
             target_from_frame.to(device, torch.float32),
             invert(frames.level_from_sensor),
         )
-        half = frames.half_extent_m
         presence = presence_map(features)
-        motion_map = self.motion_map(base, presence, level, windows, frames.stamps, half)
-        point = close_points(features) if points is None else points
-        frame = frames.point_frame[point]
-        xyz = frames.points[point]
-        position = move(level[frame], xyz[:, None])[:, 0]
-        seconds = torch.tensor(windows.gaps(frames.stamps), device=device).float()[frame]
-        spoken, speaker = _speakers(frames.pillar[point], len(point) // most + 1 if most else 1)
-        counts = torch.bincount(frame[spoken], minlength=len(frames)).tolist()
-        centre = frames.pillar_centres()[frames.pillar[point]]
-        told = torch.cat(
-            [
-                xyz[:, :2],
-                position[:, :2],
-                (xyz[:, :2] - centre) / frames.pillar_m,
-                frames.height[point, None],
-                seconds[:, None],
-            ],
-            dim=1,
-        )[spoken]
-        said = [
-            self._say(one, motion_map[window : window + 1], own, half)
-            for one, window, own in zip(
-                base, windows.of_frame, torch.split(told, counts), strict=True
-            )
-        ]
-        feature, *others = zip(*said, strict=True)
-        foreground, dynamic, offset, own_base = map(torch.cat, others)
+        motion_map = self.motion_map(
+            base, presence, level, windows, frames.stamps, frames.half_extent_m
+        )
+        view = View(frames, windows, base, motion_map, level)
+        if points is None:
+            points = view.choose(self.point_head, features.foreground, self.settings.glance_odds)
+        frame, position, seconds = view.place(points)
+        every = len(points) // most + 1 if most else 1
+        spoken, speaker = speakers_of(frames.pillar[points], every)
+        feature, foreground, dynamic, offset, own_base = view.ask(self.point_head, points[spoken])
         aside = position[spoken[speaker], :2] - position[:, :2]  # all point to the same centre
         return Perception(
-            windows, point, frame, position,
+            windows, points, frame, position,
             foreground[speaker], dynamic[speaker], offset[speaker] + aside,
             seconds, speaker, feature, own_base,
         )  # fmt: skip
-
-    def _say(
-        self, base: torch.Tensor, motion_map: torch.Tensor, told: torch.Tensor, half_extent_m: float
-    ) -> tuple[torch.Tensor, ...]:
-        """What `PointHead` says of one frame's points, and the base features that they read.
-
-        A point is told (Q, 8) by x and y in its frame, x and y ego-aligned, and its `place` there.
-        """
-        xy, aligned_xy, place = torch.split(told, [2, 2, 4], dim=1)
-        own = read(base, xy, half_extent_m)
-        motion = read(motion_map, aligned_xy, half_extent_m)
-        return (*self.point_head(motion, own, place), own)
 
     def track(self, perception: Perception, instance: torch.Tensor) -> ObjectMotions:
         """Proposed motions of objects whose points the caller knows.
@@ -376,27 +343,6 @@ def presence_map(features: FrameFeatures) -> torch.Tensor:
     maps = features.foreground.new_zeros(len(frames), 1, frames.cells, frames.cells)
     chance = features.foreground.detach().sigmoid()
     return maps.view(-1).index_copy(0, frames.pillar_place, chance).view_as(maps)
-
-
-def close_points(features: FrameFeatures) -> torch.Tensor:
-    """The points (Q,) int64, ascending, whose pillars pass the gate: worth a closer look."""
-    passed = features.foreground.detach() > FOREGROUND_GATE
-    return torch.nonzero(passed[features.frames.pillar])[:, 0]
-
-
-def _speakers(pillar: torch.Tensor, every: int) -> tuple[torch.Tensor, torch.Tensor]:
-    """Which of points (Q,), by their pillars, are read, (K,), and which of those speaks for each.
-
-    Every so many of each pillar from its first on; both int64, ascending.
-    """
-    count = torch.arange(len(pillar), device=pillar.device)
-    if every == 1:
-        return count, count
-    begins = torch.ones_like(pillar, dtype=torch.bool)
-    begins[1:] = pillar[1:] != pillar[:-1]
-    first = torch.cummax(torch.where(begins, count, 0), dim=0).values
-    reads = (count - first) % every == 0
-    return torch.nonzero(reads)[:, 0], torch.cumsum(reads, dim=0) - 1
 
 
 def build_network(settings: NetworkSettings | None = None, seed: int = 0) -> Network:

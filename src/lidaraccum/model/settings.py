@@ -9,7 +9,7 @@ from lidaraccum.errors import SettingsError
 COARSEST_CELLS = 16
 """Grid sides are multiples of this, so that every level of both U-Nets halves evenly."""
 
-EFFORT = ("extent_m", "pillar_points", "ego_pillars", "ground_pillars", "finer_m")
+EFFORT = ("extent_m", "pillar_points", "ego_pillars", "ground_pillars", "finer_m", "glance_odds")
 """Settings that say how much is looked at. Weights fit any, best those they learned with."""
 
 
@@ -42,6 +42,8 @@ class NetworkSettings:
         rematch_m: How far a pillar may lie from its partner each time it is matched again, metres.
         finer_m: The same of further times, which training goes without: they match as the last of
             ``rematch_m`` has learned to.
+        glance_odds: Of pillars that seem background in their own frame, one point is looked at in
+            the whole window, where the odds that they are not are no less than this.
         temporal_channels: Channels of the temporal block, at half the grid's resolution.
         temporal_blocks: How many of them.
         temporal: How a window's frames are put together: ``max``, the largest of what they say, or
@@ -72,6 +74,7 @@ class NetworkSettings:
     fastest_mps: float = 40.0
     rematch_m: tuple[float, ...] = (3.0, 1.5, 0.7)
     finer_m: tuple[float, ...] = (0.7, 0.4, 0.4, 0.4)
+    glance_odds: float = 0.01
     temporal_channels: int = 48
     temporal_blocks: int = 2
     temporal: str = "max"
@@ -92,8 +95,8 @@ class NetworkSettings:
             raise SettingsError(f"temporal is max or decay, not {self.temporal!r}")
         if self.tube not in ("edges", "centroid"):
             raise SettingsError(f"tube is edges or centroid, not {self.tube!r}")
-        if self.standing_odds <= 0.0:
-            raise SettingsError("standing_odds is more than 0")
+        if min(self.standing_odds, self.glance_odds) <= 0.0:
+            raise SettingsError("standing_odds and glance_odds are more than 0")
         if self.lowest_m >= self.highest_m:
             raise SettingsError("lowest_m must be below highest_m")
         self.cells(self.extent_m)

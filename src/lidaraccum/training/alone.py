@@ -15,6 +15,7 @@ from lidaraccum.model.batch import FrameTensors, to_arrays, to_indices
 from lidaraccum.model.kabsch import chain, invert, move
 from lidaraccum.model.motion import Windows
 from lidaraccum.model.network import MOST_POINTS, FrameFeatures, Network, Perception
+from lidaraccum.training.carried import carried
 
 VOXEL_M = 0.15
 """The paper, section 3.4: points are thinned before they are clustered."""
@@ -55,12 +56,15 @@ def answer_alone(
     frames, target = features.frames, windows.target[0]
     poses = own_poses(windows, target_from_source)
     seen = network.perceive(features, poses, windows, most=MOST_POINTS)
-    movable = seen.foreground > 0
+    movable = (seen.foreground > 0) & ~_carried(frames, seen, poses)
     moving = movable if "motion" in without else movable & (seen.dynamic > 0)
     if "offsets" in without:
         seen = replace(seen, offset=torch.zeros_like(seen.offset))
     ids = torch.zeros_like(seen.point)
-    ids[movable] = _clusters(seen, movable).to(ids.device)
+    # A car that passes a parked one points to a place beside it: they are no one object.
+    ids[moving] = _clusters(seen, moving, 0).to(ids.device)
+    stands = movable & ~moving
+    ids[stands] = _clusters(seen, stands, int(ids.max()) if len(ids) else 0).to(ids.device)
     level = chain(frames.level_from_sensor[target], poses, invert(frames.level_from_sensor))
     placed = move_frames(frames, level)
     chosen = ids > 0
@@ -91,9 +95,24 @@ def own_poses(windows: Windows, target_from_source: torch.Tensor) -> torch.Tenso
     return poses.index_copy(0, torch.tensor(windows.sources, device=proposed.device), proposed)
 
 
-def _clusters(seen: Perception, movable: torch.Tensor) -> torch.Tensor:
-    positions, offsets = to_arrays(seen.position[movable]), to_arrays(seen.offset[movable])
-    return torch.from_numpy(cluster_by_offsets(positions, offsets))
+def _carried(frames: FrameTensors, seen: Perception, poses: torch.Tensor) -> torch.Tensor:
+    """(Q,) bool: which of the points that seem movable are the sensor's own carrier."""
+    stays = torch.zeros_like(seen.point, dtype=torch.bool)
+    movable = seen.foreground > 0
+    frame, point = seen.frame[movable], seen.point[movable]
+    sensor = move(invert(frames.level_from_sensor)[frame], frames.points[point][:, None])[:, 0]
+    gone = poses[:, :3, 3]
+    travelled = to_arrays(gone[torch.linalg.vector_norm(gone, dim=1).argmax()])
+    own = carried(to_arrays(sensor), to_indices(frame), len(frames), travelled)
+    stays[movable] = torch.from_numpy(own).to(stays.device)
+    return stays
+
+
+def _clusters(seen: Perception, chosen: torch.Tensor, after: int) -> torch.Tensor:
+    """Objects of some of the points, 0 for none, numbered from ``after`` on."""
+    positions, offsets = to_arrays(seen.position[chosen]), to_arrays(seen.offset[chosen])
+    objects = cluster_by_offsets(positions, offsets)
+    return torch.from_numpy(np.where(objects > 0, objects + after, 0))
 
 
 def cluster_by_offsets(

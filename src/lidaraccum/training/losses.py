@@ -125,15 +125,17 @@ def object_weights(
 ) -> torch.Tensor:
     """Weights (K, T): more for frames far from the target, little for still objects.
 
-    Nothing for the anchor's own frame, for frames with too few points, and where the truth
-    (``known`` (K, T) bool) is missing; ``still`` is (K,) bool.
+    What shows many points counts more, by their root: it is what a map shows. Nothing for the
+    anchor's own frame, for frames with too few points, and where the truth (``known`` (K, T) bool)
+    is missing; ``still`` is (K,) bool.
     """
     counts = objects.tubes.counts
     span = counts.shape[1]
     ranks = torch.arange(span, device=counts.device)[None]
     away = (ranks - objects.tubes.anchor_time[:, None]).abs()
     weight = (away + 1.0) / span * torch.where(still, STILL_WEIGHT, 1.0)[:, None]
-    return weight * ((counts > FEWEST_POINTS) & (away > 0) & known)
+    dense = torch.sqrt(counts / FEWEST_POINTS)
+    return weight * dense * ((counts > FEWEST_POINTS) & (away > 0) & known)
 
 
 def _moved(

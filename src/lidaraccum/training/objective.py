@@ -9,7 +9,8 @@ import torch
 
 from lidaraccum.errors import SettingsError
 from lidaraccum.model.kabsch import chain, compose, invert, move
-from lidaraccum.model.network import FrameFeatures, Network, ObjectMotions, Perception, close_points
+from lidaraccum.model.looking import close_pillars, doubtful_pillars, points_of
+from lidaraccum.model.network import FrameFeatures, Network, ObjectMotions, Perception
 from lidaraccum.model.quaternion import rotation_of
 from lidaraccum.training.clusters import ClusterSettings, imperfect_clusters, truth_of_clusters
 from lidaraccum.training.losses import (
@@ -110,7 +111,9 @@ def objective(
     sources = source_index(batch).to(truth.known.device)
     ego = ego_loss(match, truth.level_target_from_frame[sources])
     poses = _given_poses(batch, match.target_from_source, settings, generator)
-    points = _points_to_teach(features, truth, settings.most_points, generator)
+    points = _points_to_teach(
+        features, truth, network.settings.glance_odds, settings.most_points, generator
+    )
     perception = network.perceive(
         features, poses, batch.windows, points, detach=settings.detach_motion
     )
@@ -135,7 +138,9 @@ def _objective_of_tubes(
     with torch.no_grad():
         features = network.encode(batch.frames, matchable=False)
         poses = _given_poses(batch, truth.target_from_frame[:0], settings, generator)
-        points = _points_to_teach(features, truth, settings.most_points, generator)
+        points = _points_to_teach(
+            features, truth, network.settings.glance_odds, settings.most_points, generator
+        )
         perception = network.perceive(features, poses, batch.windows, points)
     aligned_from_object = object_poses(batch, poses)
     objects = _object_loss(network, perception, truth, aligned_from_object, settings, generator)
@@ -176,17 +181,36 @@ def _given_poses(
 
 
 def _points_to_teach(
-    features: FrameFeatures, truth: Truth, most: int, generator: torch.Generator
+    features: FrameFeatures,
+    truth: Truth,
+    glance_odds: float,
+    most: int,
+    generator: torch.Generator,
 ) -> torch.Tensor:
-    """Annotated points (Q,) that pass the gate or should have, thinned by lot where too many."""
+    """Annotated points (Q,), ascending, thinned by lot where too many.
+
+    Those that pass the gate or should have, and, for a third, background that is glanced at: the
+    likelier to pass the gate, the likelier drawn.
+    """
+    device = truth.foreground.device
     wanted = torch.zeros_like(truth.foreground)
-    wanted[close_points(features)] = True
+    wanted[points_of(features.frames, close_pillars(features.foreground))] = True
     wanted = (wanted | truth.foreground) & truth.annotated
     points = torch.nonzero(wanted)[:, 0]
-    if len(points) > most:
-        kept = torch.randperm(len(points), generator=generator)[:most].to(points.device)
-        points = points[torch.sort(kept)[0]]
-    return points
+    glanced = points_of(features.frames, doubtful_pillars(features.foreground, glance_odds))
+    glanced = glanced[(truth.annotated & ~truth.foreground)[glanced]]
+    aside = min(len(glanced), most // 3, (len(points) + 1) // 2)
+    if aside:
+        lot = torch.rand(len(glanced), generator=generator).to(device)
+        score = features.foreground.detach()[features.frames.pillar[glanced]]
+        key = score - torch.log(-torch.log(lot.clamp(1e-7, 1.0 - 1e-7)))  # drawn by their odds
+        glanced = glanced[torch.topk(key, aside).indices]
+    else:
+        glanced = glanced[:0]
+    if len(points) > most - aside:
+        kept = torch.randperm(len(points), generator=generator)[: most - aside].to(device)
+        points = points[kept]
+    return torch.sort(torch.cat([points, glanced])).values
 
 
 def object_poses(batch: Batch, target_from_frame: torch.Tensor) -> torch.Tensor:
