@@ -120,8 +120,7 @@ def objective(
     foreground = pillar_loss(features, truth) + segmentation_loss(
         perception.foreground, truth.foreground[points]
     )
-    mine = truth.foreground[points]
-    motion = segmentation_loss(perception.dynamic[mine], truth.dynamic[points][mine])
+    motion = segmentation_loss(perception.dynamic, truth.dynamic[points])
     aligned_from_object = object_poses(batch, poses)
     offset = _offset_loss(perception, truth, aligned_from_object)
     objects = _object_loss(network, perception, truth, aligned_from_object, settings, generator)
