@@ -11,7 +11,7 @@ from lidaraccum.data.frame import Frame
 from lidaraccum.model.batch import prepare, to_tensors
 from lidaraccum.model.deepen import deepened
 from lidaraccum.model.motion import Windows
-from lidaraccum.model.network import Network
+from lidaraccum.model.network import Network, build_network
 
 
 def answers(network: Network, frames: list[Frame]) -> tuple[torch.Tensor, ...]:
@@ -55,6 +55,17 @@ def test_another_kind_of_tube_net_begins_anew_and_all_else_stays(
     kept = {name for name in same if name in other and torch.equal(same[name], other[name])}
     assert all(name in kept for name in same if not name.startswith("tube_net."))
     assert "tube_net.place.0.weight" not in kept
+
+
+def test_a_tube_net_that_asks_sides_begins_as_one_that_asks_edges(network: Network) -> None:
+    edges = build_network(replace(network.settings, tube="edges"), seed=7)
+    sides = deepened(edges, replace(network.settings, tube="sides"))
+    assert sides.settings.tube == "sides"
+    grown = sides.state_dict()
+    assert all(torch.equal(values, grown[name]) for name, values in edges.state_dict().items())
+    assert {name for name in grown if name not in edges.state_dict()} == {
+        f"tube_net.sides.say.{layer}.{kind}" for layer in (0, 2) for kind in ("weight", "bias")
+    }
 
 
 def test_the_levels_added_learn_from_the_second_step_on(

@@ -110,7 +110,7 @@ class Oracle:
         motion = true_motion(aligned, tubes.anchor_time)[:, : tubes.counts.shape[1]]
         if not self.tracks:
             motion = torch.eye(4).expand_as(motion)
-        return ObjectMotions(ids, window, tubes, None, motion)
+        return ObjectMotions(ids, window, row, frame, tubes, None, motion)
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,8 @@ from lidaraccum.model.unet import channels_last
 def deepened(network: Network, settings: NetworkSettings) -> Network:
     """A network with as many levels as the settings ask for, which says what this one says.
 
-    Where the settings ask for another kind of TubeNet, a fresh one takes the trained one's place.
+    Where the settings ask for another kind of TubeNet, a fresh one takes the trained one's place;
+    only one that asks sides begins as one that asks edges.
 
     Args:
         network: Trained. It is returned as it is where the settings ask for no more levels, or for
@@ -40,7 +41,7 @@ def deepened(network: Network, settings: NetworkSettings) -> Network:
         grown.backbone.go_on_from(network.backbone)
         grown.motion_map.unet.go_on_from(network.motion_map.unet)
         anew = ["backbone.", "motion_map.unet."]
-        if deeper.tube != own.tube:
+        if deeper.tube != own.tube and "centroid" in (deeper.tube, own.tube):
             anew.append("tube_net.")
         rest = {
             name: values

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 import torch
 from torch import nn
 
-from lidaraccum.model.kabsch import compose, move
 from lidaraccum.model.tubes import LENGTH_M, Tubes, centroid_gap
 
 DIRECTIONS = 16
@@ -148,31 +147,20 @@ class StraightOn(nn.Module):
         nn.init.zeros_(self.say.weight)
         nn.init.zeros_(self.say.bias)
 
-    def forward(
-        self,
-        tubes: Tubes,
-        said: torch.Tensor,
-        rotation: torch.Tensor,
-        shift: torch.Tensor,
-        gone: torch.Tensor,
-    ) -> torch.Tensor:
-        """Shifts (K, T, 3) of a step, metres.
+    def forward(self, tubes: Tubes, said: torch.Tensor, gone: torch.Tensor) -> torch.Tensor:
+        """What to add (K, T, 3), metres, to how far objects have gone.
 
         Args:
             tubes: Points of K objects over T times.
             said: (K, T, C) what TubeNet thinks of each.
-            rotation: (K, T, 3, 3) of the step.
-            shift: (K, T, 3) of the step, as regressed.
-            gone: (K, T, 3) metres shifted before.
+            gone: (K, T, 3) metres from each time to the anchor's.
         """
-        whole = move(compose(rotation, shift), gone[:, :, None])[:, :, 0]
         count, drawn = self.say(said).sigmoid().unbind(dim=2)
         seconds = tubes.seconds_by_time()
         count = torch.where(tubes.fixed(), 0.0, count)
-        velocity = ((count * seconds)[..., None] * whole).sum(dim=1)
+        velocity = ((count * seconds)[..., None] * gone).sum(dim=1)
         velocity = velocity / ((count * seconds**2).sum(dim=1, keepdim=True) + 1e-6)
-        steady = velocity[:, None] * seconds[..., None]
-        return shift + drawn[..., None] * (steady - whole)
+        return drawn[..., None] * (velocity[:, None] * seconds[..., None] - gone)
 
 
 def _directions() -> torch.Tensor:

@@ -25,12 +25,15 @@ from lidaraccum.model.pillars import PillarEncoder
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.model.steady import outward, steady
 from lidaraccum.model.tube_net import TubeMotions, TubeNet
-from lidaraccum.model.tubes import Tubes, gather_tubes
+from lidaraccum.model.tubes import Tubes, gather_tubes, one_of_each_cell
 from lidaraccum.model.unet import UNet, channels_last, convolution, to_one_channel
 
 MOST_POINTS = 200_000
 """So many points of a window are looked at closely by those who bound their time: dense sensors,
 and weights that take everything for movable, would have many more."""
+
+TUBE_CELL_M = 0.15
+"""TubeNet sees one of an object's points in each cell; the paper thins points like this too."""
 
 RARE = -2.0
 """Logit that foreground starts from: most pillars hold none."""
@@ -123,7 +126,7 @@ class Perception:
         return torch.cat(self.features)
 
     def features_of(self, chosen: torch.Tensor) -> torch.Tensor:
-        """(N, D) features of the points that are chosen (Q,), in order."""
+        """(N, D) features of chosen points, (N,) int64 ascending."""
         wanted, first, parts = self.speaker[chosen], 0, []
         for one in self.features:
             own = wanted[(wanted >= first) & (wanted < first + len(one))] - first
@@ -132,7 +135,7 @@ class Perception:
         return torch.cat(parts)
 
     def base_of(self, chosen: torch.Tensor) -> torch.Tensor:
-        """(N, C) base features of the points that are chosen (Q,), in order."""
+        """(N, C) base features of chosen points, (N,) int64."""
         return self.base[self.speaker[chosen]]
 
 
@@ -143,7 +146,9 @@ class ObjectMotions:
     Attributes:
         ids: (K,) int64: the caller's, ascending.
         window: (K,) int64 window each is in.
-        tubes: Their points.
+        instance: (N,) int64, 0..K-1, of the points that were named, in order.
+        time: (N,) int64 rank of their frames in their windows.
+        tubes: Their points, as TubeNet saw them.
         motions: What TubeNet regressed, about the objects' anchors.
         target_from_aligned: (K, T, 4, 4): from the object's ego-aligned place at each time of its
             window to its place at the anchor's time; level coordinates of the target. The
@@ -152,6 +157,8 @@ class ObjectMotions:
 
     ids: torch.Tensor
     window: torch.Tensor
+    instance: torch.Tensor
+    time: torch.Tensor
     tubes: Tubes
     motions: TubeMotions
     target_from_aligned: torch.Tensor
@@ -316,21 +323,27 @@ class Network(nn.Module):
         target = torch.tensor(perception.windows.target, device=device) - first
         of_frame = torch.tensor(perception.windows.of_frame, device=device)
         frame = perception.frame[chosen]
+        time = frame - first[of_frame[frame]]
         window = torch.zeros_like(ids).index_copy(0, row, of_frame[frame])
+        shown = torch.arange(len(chosen), device=device)
+        if self.settings.tube == "sides":
+            slot = row * max(lengths) + time
+            shown = one_of_each_cell(perception.position[chosen], slot, TUBE_CELL_M)
+        asked = chosen[shown]
         tubes = gather_tubes(
-            perception.position[chosen],
-            row,
-            frame - first[of_frame[frame]],
-            perception.seconds[chosen],
+            perception.position[asked],
+            row[shown],
+            time[shown],
+            perception.seconds[asked],
             target[window],
             len(ids),
         )
-        motions = self.tube_net(
-            tubes, perception.features_of(instance > 0), perception.base_of(instance > 0)
-        )
+        motions = self.tube_net(tubes, perception.features_of(asked), perception.base_of(asked))
         return ObjectMotions(
             ids=ids,
             window=window,
+            instance=row,
+            time=time,
             tubes=tubes,
             motions=motions,
             target_from_aligned=about(motions.anchor_from_time[-1], -tubes.anchor[:, None]),

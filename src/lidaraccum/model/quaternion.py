@@ -17,6 +17,12 @@ def rotation_of(quaternion: torch.Tensor) -> torch.Tensor:
     return torch.stack([torch.stack(row, dim=-1) for row in rows], dim=-2)
 
 
+def about_vertical(angle: torch.Tensor) -> torch.Tensor:
+    """Quaternion (..., 4), w x y z, of turns (...,) about z, radians."""
+    none = torch.zeros_like(angle)
+    return torch.stack([torch.cos(0.5 * angle), none, none, torch.sin(0.5 * angle)], dim=-1)
+
+
 def quaternion_of(rotation: torch.Tensor) -> torch.Tensor:
     """Unit quaternion (..., 4), w x y z with w 0 or more, of a rotation (..., 3, 3).
 

@@ -51,8 +51,9 @@ class NetworkSettings:
         motion_widths: Channels of the motion U-Net by level, from half resolution on; the first
             is that of the motion features.
         point_channels: Channels of a point's motion features.
-        tube: How an object's shift is had: by its ``edges``, or as a share of the gap between its
-            centroids (``centroid``); see `model.tube_net`.
+        tube: How an object's motion is had: by its ``sides`` and edges, of its points thinned to
+            one of each cell; by its ``edges``; or as a share of the gap between its centroids
+            (``centroid``); see `model.tube_net`.
         tube_channels: Channels of what TubeNet says of an object's positions in one frame.
     """
 
@@ -80,7 +81,7 @@ class NetworkSettings:
     temporal: str = "max"
     motion_widths: tuple[int, ...] = (64, 96, 128, 160)
     point_channels: int = 128
-    tube: str = "edges"
+    tube: str = "sides"
     tube_channels: int = 128
 
     def __post_init__(self) -> None:
@@ -93,8 +94,8 @@ class NetworkSettings:
             raise SettingsError("a U-Net has 2 to 5 levels (base), 2 to 4 (motion)")
         if self.temporal not in ("max", "decay"):
             raise SettingsError(f"temporal is max or decay, not {self.temporal!r}")
-        if self.tube not in ("edges", "centroid"):
-            raise SettingsError(f"tube is edges or centroid, not {self.tube!r}")
+        if self.tube not in ("sides", "edges", "centroid"):
+            raise SettingsError(f"tube is sides, edges or centroid, not {self.tube!r}")
         if min(self.standing_odds, self.glance_odds) <= 0.0:
             raise SettingsError("standing_odds and glance_odds are more than 0")
         if self.lowest_m >= self.highest_m:

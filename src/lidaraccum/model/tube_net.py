@@ -7,12 +7,20 @@ from dataclasses import dataclass
 import torch
 from torch import nn
 
+from lidaraccum.model.bends import bend_of, bent, unbent
 from lidaraccum.model.edges import EdgeShift, StraightOn
-from lidaraccum.model.kabsch import chain, compose, exactly
+from lidaraccum.model.kabsch import chain, compose, exactly, move
 from lidaraccum.model.pooling import tallest
-from lidaraccum.model.quaternion import rotation_of
+from lidaraccum.model.quaternion import about_vertical, rotation_of
 from lidaraccum.model.settings import NetworkSettings
-from lidaraccum.model.tubes import LENGTH_M, Tubes, centroid_gap, move_points
+from lidaraccum.model.tubes import (
+    LENGTH_M,
+    Tubes,
+    centre_by_time,
+    centroid_gap,
+    move_points,
+)
+from lidaraccum.model.turns import SideTurn
 from lidaraccum.model.unet import linear
 
 ITERATIONS = 2
@@ -43,9 +51,11 @@ class TubeMotions:
 class TubeNet(nn.Module):
     """Regresses, for each object and time, the rigid motion to the object's anchor frame.
 
-    Ours: the shift is what the object's edges and its centroid say, weighted, plus a correction,
-    and drawn towards steady motion; the net is told from where the object is seen. With
-    ``tube = "centroid"`` it is a share of the gap between the centroids plus a correction.
+    Ours: the turn is what the object's sides say, plus a correction; the shift is what its edges
+    and its centroid say, once it is turned, weighted, plus a correction, and drawn towards steady
+    motion; the net is told from where the object is seen. With ``tube = "edges"`` sides are not
+    asked; with ``"centroid"`` the shift is a share of the gap between the centroids plus a
+    correction.
 
     Source: the paper, section 3.5 and supplement.
     """
@@ -53,7 +63,7 @@ class TubeNet(nn.Module):
     def __init__(self, settings: NetworkSettings) -> None:
         super().__init__()
         wide = settings.tube_channels
-        by_edges = settings.tube == "edges"
+        by_edges = settings.tube in ("edges", "sides")
         self.motion = nn.Sequential(linear(settings.point_channels, 64), nn.ReLU(inplace=True))
         self.ego = nn.Sequential(linear(settings.base_widths[0], 64), nn.ReLU(inplace=True))
         self.place = nn.Sequential(
@@ -77,6 +87,7 @@ class TubeNet(nn.Module):
         nn.init.zeros_(self.last.bias)  # the identity: see `_identity`
         self.edges = EdgeShift(_SAID) if by_edges else None
         self.straight = StraightOn(_SAID) if by_edges else None
+        self.sides = SideTurn(_SAID) if settings.tube == "sides" else None
 
     def forward(self, tubes: Tubes, motion: torch.Tensor, base: torch.Tensor) -> TubeMotions:
         """Motions of K objects, from features (Q, D) and (Q, C) of their points."""
@@ -109,7 +120,10 @@ class TubeNet(nn.Module):
         """Quaternion (K, T, 4) and shift (K, T, 3) of this iteration."""
         count, span = tubes.counts.shape
         moved = move_points(total, tubes)
-        gone = total[..., :3, 3]
+        if self.sides is None:
+            gone = total[..., :3, 3]
+        else:
+            gone = centre_by_time(moved, tubes) - centre_by_time(tubes.relative, tubes)
         place = self.place(torch.cat([moved / LENGTH_M, tubes.seconds[:, None]], dim=1))
         summary = tallest(torch.relu(place), tubes.slot(), count * span).view(count, span, -1)
         gap = centroid_gap(moved, tubes)
@@ -126,12 +140,23 @@ class TubeNet(nn.Module):
         said = self.regress(torch.cat(known, dim=2))
         numbers = self.last(said)
         fixed = tubes.fixed()[..., None]
-        quaternion = _identity(numbers) + torch.where(fixed, 0.0, numbers[..., :4])
+        regressed = torch.where(fixed, 0.0, numbers[..., :4])
         if self.edges is None or self.straight is None:
+            quaternion = _identity(numbers) + regressed
             shift = numbers[..., 4:7] + numbers[..., 7:] * gap
-        else:
+        elif self.sides is None:
+            quaternion = _identity(numbers) + regressed
             shift = numbers[..., 4:] + self.edges(tubes, said, moved, gone)
-            shift = self.straight(tubes, said, rotation_of(quaternion), shift, gone)
+            whole = move(compose(rotation_of(quaternion), shift), gone[:, :, None])[:, :, 0]
+            shift = shift + self.straight(tubes, said, whole)
+        else:
+            quaternion = regressed + about_vertical(self.sides(tubes, said, moved))
+            turn = rotation_of(quaternion)
+            turned, aside = turn_in_place(turn, moved, tubes)
+            shift = numbers[..., 4:] + self.edges(tubes, said, turned, gone)
+            bend = bend_of(turn @ total[..., :3, :3])
+            straightened = unbent(gone + shift, bend)
+            shift = aside + shift + bent(self.straight(tubes, said, straightened), bend)
         return quaternion, torch.where(fixed, 0.0, shift)
 
 
@@ -147,6 +172,19 @@ def _circumstances(tubes: Tubes, gone: torch.Tensor) -> list[torch.Tensor]:
         tubes.at_anchor(plenty).expand(-1, span, -1),
         gone / LENGTH_M,
     ]
+
+
+def turn_in_place(
+    turn: torch.Tensor, moved: torch.Tensor, tubes: Tubes
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Points (Q, 3), each object's turned about its centroid at each time by (K, T, 3, 3).
+
+    And the shifts (K, T, 3) of turns about the anchor that do the same.
+    """
+    centre = centre_by_time(moved, tubes)
+    aside = centre - (turn @ centre[..., None])[..., 0]
+    mine = compose(turn, aside)[tubes.instance, tubes.time]
+    return move(mine, moved[:, None])[:, 0], aside
 
 
 def _identity(numbers: torch.Tensor) -> torch.Tensor:

@@ -10,6 +10,8 @@ from lidaraccum.model.kabsch import move
 
 LENGTH_M = 4.0
 """About that of a car: positions are told in it."""
+_MOST_CELLS = 2**15
+"""Cells in each direction from the origin of coordinates."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,14 +110,35 @@ def gather_tubes(
     )
 
 
+def one_of_each_cell(position: torch.Tensor, slot: torch.Tensor, cell_m: float) -> torch.Tensor:
+    """(M,) int64, ascending: one of the points (Q, 3) in each cell, slot (Q,) by slot.
+
+    What is near shows many points of few places; thinned, it shows what is seen of it.
+    """
+    cell = torch.floor(position / cell_m).long().clamp(-_MOST_CELLS, _MOST_CELLS - 1)
+    key = slot
+    for axis in cell.unbind(dim=1):
+        key = key * (2 * _MOST_CELLS) + axis + _MOST_CELLS
+    _, place = torch.unique(key, return_inverse=True)
+    count = int(place.max()) + 1 if len(place) else 0
+    rows = torch.arange(len(place), device=place.device)
+    first = torch.full((count,), len(place), device=place.device)
+    return torch.sort(first.scatter_reduce(0, place, rows, "amin")).values
+
+
+def centre_by_time(moved: torch.Tensor, tubes: Tubes) -> torch.Tensor:
+    """(K, T, 3) metres: mean of an object's moved points (Q, 3) at each time; 0 for none."""
+    sums = moved.new_zeros(tubes.counts.numel(), 3).index_add(0, tubes.slot(), moved)
+    return sums.view(*tubes.counts.shape, 3) / tubes.counts.clamp_min(1)[..., None]
+
+
 def centroid_gap(moved: torch.Tensor, tubes: Tubes) -> torch.Tensor:
     """(K, T, 3) metres from the mean of an object's moved points (Q, 3) to that at its anchor.
 
     Most of a shift, had for nothing; what share of it is motion, and what share another view of
     the same sides, is for the net to say.
     """
-    sums = moved.new_zeros(tubes.counts.numel(), 3).index_add(0, tubes.slot(), moved)
-    mean = sums.view(*tubes.counts.shape, 3) / tubes.counts.clamp_min(1)[..., None]
+    mean = centre_by_time(moved, tubes)
     return torch.where(tubes.counts[..., None] > 0, tubes.at_anchor(mean) - mean, 0.0)
 
 

@@ -70,7 +70,7 @@ def answer_alone(
     chosen = ids > 0
     if chosen.any():
         objects = network.track(seen, ids)
-        own = objects.target_from_aligned[objects.tubes.instance, objects.tubes.time]
+        own = objects.target_from_aligned[objects.instance, objects.time]
         there = move(own, seen.position[chosen][:, None])[:, 0]
         goes = moving[chosen]
         placed[seen.point[chosen][goes]] = there[goes]

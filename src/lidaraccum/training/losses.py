@@ -14,8 +14,8 @@ LARGEST_CLASS_WEIGHT = 50.0
 INLIER_WEIGHT = 0.005
 ITERATION_WEIGHTS = (0.7, 1.0)
 STILL_WEIGHT = 0.2
-FEWEST_POINTS = 50
-"""Frames in which an object has this many points or fewer teach nothing about its motion."""
+FEWEST_POINTS = 30
+"""Frames in which an object has this many points or fewer, thinned, teach nothing about its motion."""
 NO_DIRECTION_M = 1e-3
 """An offset shorter than this points nowhere."""
 

@@ -117,12 +117,11 @@ def _object_errors(
     position, dynamic = told.position[row >= 0], truth.dynamic[told.point[row >= 0]]
     aligned = object_poses(batch, truth.target_from_frame)
     motion, _ = object_truth(objects, truth, aligned, objects.ids - 1)
-    tubes = objects.tubes
-    at = (tubes.instance, tubes.time)
+    at = (objects.instance, objects.time)
     known = truth.known[objects.ids - 1][at]
-    moving = dynamic & known & (tubes.time != tubes.anchor_time[at[0]])
+    moving = dynamic & known & (objects.time != objects.tubes.anchor_time[objects.instance])
     points = position[moving][:, None]
-    mine = (tubes.instance[moving], tubes.time[moving])
+    mine = (objects.instance[moving], objects.time[moving])
     there = move(objects.target_from_aligned[mine], points)[:, 0] - points[:, 0]
     wanted = move(motion[mine], points)[:, 0] - points[:, 0]
     true_flow = to_arrays(wanted)
