@@ -62,7 +62,9 @@ def test_a_tube_net_that_asks_sides_begins_as_one_that_asks_edges(network: Netwo
     sides = deepened(edges, replace(network.settings, tube="sides"))
     assert sides.settings.tube == "sides"
     grown = sides.state_dict()
-    assert all(torch.equal(values, grown[name]) for name, values in edges.state_dict().items())
+    for name, values in edges.state_dict().items():
+        turns = 4 if name.startswith("tube_net.last.") else 0
+        assert torch.equal(values[turns:], grown[name][turns:])
     assert {name for name in grown if name not in edges.state_dict()} == {
         f"tube_net.sides.say.{layer}.{kind}" for layer in (0, 2) for kind in ("weight", "bias")
     }

@@ -150,7 +150,9 @@ class TubeNet(nn.Module):
             whole = move(compose(rotation_of(quaternion), shift), gone[:, :, None])[:, :, 0]
             shift = shift + self.straight(tubes, said, whole)
         else:
-            quaternion = regressed + about_vertical(self.sides(tubes, said, moved))
+            # Without its own real part: that grew, and drowned what was to be turned.
+            quaternion = about_vertical(self.sides(tubes, said, moved))
+            quaternion = quaternion + nn.functional.pad(regressed[..., 1:], (1, 0))
             turn = rotation_of(quaternion)
             turned, aside = turn_in_place(turn, moved, tubes)
             shift = numbers[..., 4:] + self.edges(tubes, said, turned, gone)

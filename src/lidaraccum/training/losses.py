@@ -15,7 +15,7 @@ INLIER_WEIGHT = 0.005
 ITERATION_WEIGHTS = (0.7, 1.0)
 STILL_WEIGHT = 0.2
 FEWEST_POINTS = 30
-"""Frames in which an object has this many points or fewer, thinned, teach nothing about its motion."""
+"""Frames in which an object has so few points, thinned, teach nothing about its motion."""
 NO_DIRECTION_M = 1e-3
 """An offset shorter than this points nowhere."""
 
