@@ -66,7 +66,9 @@ def test_a_tube_net_that_asks_sides_begins_as_one_that_asks_edges(network: Netwo
         turns = 4 if name.startswith("tube_net.last.") else 0
         assert torch.equal(values[turns:], grown[name][turns:])
     assert {name for name in grown if name not in edges.state_dict()} == {
-        f"tube_net.sides.say.{layer}.{kind}" for layer in (0, 2) for kind in ("weight", "bias")
+        f"tube_net.{layer}.{kind}"
+        for layer in ("sides.say.0", "sides.say.2", "straight.sure")
+        for kind in ("weight", "bias")
     }
 
 

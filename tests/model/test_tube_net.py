@@ -143,7 +143,7 @@ def test_who_is_not_seen_does_not_move() -> None:
 
 
 def test_steady_motion_stays_and_what_jumps_is_drawn_to_it() -> None:
-    straight = StraightOn(CHANNELS)
+    straight = StraightOn(CHANNELS, askew=False)
     tubes = tubes_of([car() + VELOCITY * 0.1 * time for time in range(5)])
     steady = -VELOCITY * 0.1 * torch.arange(5)[None, :, None]
     said = torch.zeros(1, 5, CHANNELS)
@@ -154,6 +154,23 @@ def test_steady_motion_stays_and_what_jumps_is_drawn_to_it() -> None:
         after = jumping + straight(tubes, said, jumping)
     assert (after - steady)[0, 2].norm() < 0.25
     assert (after - steady)[0].norm() < (jumping - steady)[0].norm()
+
+
+@pytest.mark.parametrize(("cost", "left"), [(-9.0, 0.1), (9.0, 0.9)])
+def test_what_the_anchor_alone_has_wrong_is_found_where_it_may_be(cost: float, left: float) -> None:
+    straight = StraightOn(CHANNELS, askew=True)
+    tubes = tubes_of([car() + VELOCITY * 0.1 * time for time in range(5)])
+    steady = -VELOCITY * 0.1 * torch.arange(5)[None, :, None]
+    askew = steady + torch.tensor([0.5, 0.0, 0.0])
+    askew[0, 0] = 0.0
+    said = torch.zeros(1, 5, CHANNELS)
+    with torch.no_grad():
+        straight.sure.bias.fill_(cost)
+        straight.say.bias[1] = 9.0  # what it finds is believed
+        after = askew + straight(tubes, said, askew)
+        torch.testing.assert_close(straight(tubes, said, steady), 0.0 * steady, atol=1e-3, rtol=0)
+    error = (after - steady)[0, 1:].norm(dim=1).mean() / 0.5
+    assert error < left if cost < 0.0 else 0.5 < error < left
 
 
 def test_there_are_three_kinds() -> None:

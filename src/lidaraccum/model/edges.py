@@ -26,6 +26,8 @@ _FURTHEST_M = 3.0
 """What one edge says beyond what the centroid says is told up to here."""
 _NEAR_M = 0.1
 """Who went less than about this has no direction of going."""
+_SURE = 8.0
+"""At first the anchor's frame counts as so many others."""
 _BREATH = 1e-3
 """Of the centroid, which decides where edges say nothing."""
 
@@ -138,14 +140,19 @@ class EdgeShift(nn.Module):
 class StraightOn(nn.Module):
     """Draws an object's shifts towards those of steady motion, as far as that is to be believed.
 
-    Frames err each in its own way, and few objects change their speed within half a second.
+    Frames err each in its own way, and few objects change their speed within half a second. The
+    anchor's frame errs too: if ``askew``, what all others have in common beside their motion is
+    taken for its error, as far as it is learned that it may be.
     """
 
-    def __init__(self, channels: int) -> None:
+    def __init__(self, channels: int, askew: bool) -> None:
         super().__init__()
         self.say = nn.Linear(channels, 2)
-        nn.init.zeros_(self.say.weight)
-        nn.init.zeros_(self.say.bias)
+        self.sure = nn.Linear(channels, 1) if askew else None
+        for layer in (self.say, self.sure):
+            if layer is not None:
+                nn.init.zeros_(layer.weight)
+                nn.init.zeros_(layer.bias)
 
     def forward(self, tubes: Tubes, said: torch.Tensor, gone: torch.Tensor) -> torch.Tensor:
         """What to add (K, T, 3), metres, to how far objects have gone.
@@ -158,8 +165,16 @@ class StraightOn(nn.Module):
         count, drawn = self.say(said).sigmoid().unbind(dim=2)
         seconds = tubes.seconds_by_time()
         count = torch.where(tubes.fixed(), 0.0, count)
-        velocity = ((count * seconds)[..., None] * gone).sum(dim=1)
-        velocity = velocity / ((count * seconds**2).sum(dim=1, keepdim=True) + 1e-6)
+        ways = ((count * seconds)[..., None] * gone).sum(dim=1)
+        spans = (count * seconds**2).sum(dim=1, keepdim=True)
+        if self.sure is not None:
+            # Least squares of a steady motion and one shift of all, which costs its square.
+            cost = _SURE * self.sure(tubes.at_anchor(said))[:, 0].exp()
+            share = (count * seconds).sum(dim=1, keepdim=True)
+            share = share / (count.sum(dim=1, keepdim=True) + cost)
+            ways = ways - share * (count[..., None] * gone).sum(dim=1)
+            spans = spans - share * (count * seconds).sum(dim=1, keepdim=True)
+        velocity = ways / (spans + 1e-6)
         return drawn[..., None] * (velocity[:, None] * seconds[..., None] - gone)
 
 

@@ -86,7 +86,7 @@ class TubeNet(nn.Module):
         nn.init.normal_(self.last.weight, std=1e-5)
         nn.init.zeros_(self.last.bias)  # the identity: see `_identity`
         self.edges = EdgeShift(_SAID) if by_edges else None
-        self.straight = StraightOn(_SAID) if by_edges else None
+        self.straight = StraightOn(_SAID, settings.tube == "sides") if by_edges else None
         self.sides = SideTurn(_SAID) if settings.tube == "sides" else None
 
     def forward(self, tubes: Tubes, motion: torch.Tensor, base: torch.Tensor) -> TubeMotions:
