@@ -28,7 +28,10 @@ FEWEST_POINTS = 50
 
 
 MOST_TO_TRACK = 200
-"""So many points of an object speak for its motion in a frame; of more, every second or third."""
+"""So many points of an object speak for its motion in a frame; of more, every second or third.
+
+A TubeNet that thins them by place, to more where there is more to see, is given all.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,9 +160,11 @@ class NetworkReader:
         seen, places = kept.perception, list(kept.places)
         frame, rows = to_indices(seen.frame), to_indices(kept.features.frames.rows[seen.point])
         ids = np.zeros(len(rows), dtype=np.int64)
+        thins = self._network.settings.tube == "sides"
         for order, place in enumerate(places):
             own = frame == order
-            ids[own] = thinned(instances[place][rows[own]])
+            named = instances[place][rows[own]]
+            ids[own] = named if thins else thinned(named)
         if not ids.any():
             return self.track(replace(reading, kept=None), instances)
         with _answering():
