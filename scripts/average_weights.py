@@ -3,8 +3,8 @@
 Usage: average_weights.py WEIGHTS WEIGHTS... -o OUT [--ego-pillars N] [--tubes WEIGHTS]
 
 Source: Wortsman et al., "Model soups" (ICML 2022). The runs may differ in seed and recipe, the
-networks only in how many pillars they match: the mean as many as the first, or as it is told. And
-in TubeNet, where one is named whose TubeNet the mean is to have.
+networks only in how much they look at: the mean as the first, and as many pillars as it is told.
+And in TubeNet, where one is named whose TubeNet the mean is to have: it then looks as that one.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ def main() -> None:
     networks = [load_network(path) for path in options.weights]
     mean = load_network(options.tubes) if options.tubes else networks[0]
     count = options.ego_pillars or networks[0].settings.ego_pillars
-    tube = {"tube": mean.settings.tube} if options.tubes else {}
-    settings = {
-        replace(network.settings, ego_pillars=count, **tube) for network in [mean, *networks]
-    }
+    alike = {"ego_pillars": count, "glance_odds": mean.settings.glance_odds}
+    if options.tubes:
+        alike["tube"] = mean.settings.tube
+    settings = {replace(network.settings, **alike) for network in [mean, *networks]}
     if len(settings) > 1:
         parser.error("the networks differ in their settings")
     mean.settings = settings.pop()
