@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from lidaraccum.geometry.clustering import dense_groups
+from lidaraccum.geometry.clustering import connected_cells, dense_groups
 from lidaraccum.geometry.voxel import voxel_keys
 from lidaraccum.model.batch import FrameTensors, to_arrays, to_indices
 from lidaraccum.model.kabsch import chain, invert, move
@@ -24,6 +24,8 @@ RADIUS_M = 0.4
 NEIGHBOURS = 5
 MIN_VOXELS = 15
 """DBSCAN of positions plus offsets, seen from above, and its least cluster; METHOD.md section 4."""
+GAP_M, STRAY_SHARE = 0.4, 0.05
+"""What such a gap parts from the rest of an object, and is a smaller share, says nothing of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +71,10 @@ def answer_alone(
     placed = move_frames(frames, level)
     chosen = ids > 0
     if chosen.any():
-        objects = network.track(seen, ids)
-        own = objects.target_from_aligned[objects.instance, objects.time]
-        there = move(own, seen.position[chosen][:, None])[:, 0]
+        objects = network.track(seen, torch.where(_hangs_together(seen, ids), ids, 0))
+        own = torch.searchsorted(objects.ids, ids[chosen])
+        motion = objects.target_from_aligned[own, seen.frame[chosen]]
+        there = move(motion, seen.position[chosen][:, None])[:, 0]
         goes = moving[chosen]
         placed[seen.point[chosen][goes]] = there[goes]
     dynamic = torch.zeros(len(placed), dtype=torch.bool, device=placed.device)
@@ -113,6 +116,25 @@ def _clusters(seen: Perception, chosen: torch.Tensor, after: int) -> torch.Tenso
     positions, offsets = to_arrays(seen.position[chosen]), to_arrays(seen.offset[chosen])
     objects = cluster_by_offsets(positions, offsets)
     return torch.from_numpy(np.where(objects > 0, objects + after, 0))
+
+
+def _hangs_together(seen: Perception, ids: torch.Tensor) -> torch.Tensor:
+    """(Q,) bool: which points of objects (Q,), 0 for none, may speak for how those went.
+
+    In each frame what hangs together, seen from above, and is no small share of the object: an echo
+    of the rain before a car would be its foremost point.
+    """
+    position, object_, frame = to_arrays(seen.position), to_indices(ids), to_indices(seen.frame)
+    speaks = np.zeros(len(ids), dtype=np.bool_)
+    for one in np.unique(object_[object_ > 0]):
+        mine = np.flatnonzero(object_ == one)
+        for when in np.unique(frame[mine]):
+            shown = mine[frame[mine] == when]
+            part = connected_cells(position[shown], GAP_M)
+            _, first = np.unique(voxel_keys(position[shown], VOXEL_M), return_index=True)
+            counts = np.bincount(part[first], minlength=part.max() + 1)
+            speaks[shown] = counts[part] >= min(STRAY_SHARE * len(first), counts.max())
+    return torch.from_numpy(speaks).to(ids.device)
 
 
 def cluster_by_offsets(
