@@ -71,7 +71,7 @@ def answer_alone(
     placed = move_frames(frames, level)
     chosen = ids > 0
     if chosen.any():
-        objects = network.track(seen, torch.where(_hangs_together(seen, ids), ids, 0))
+        objects = network.track(seen, torch.where(_speaking(seen, ids), ids, 0))
         own = torch.searchsorted(objects.ids, ids[chosen])
         motion = objects.target_from_aligned[own, seen.frame[chosen]]
         there = move(motion, seen.position[chosen][:, None])[:, 0]
@@ -118,23 +118,34 @@ def _clusters(seen: Perception, chosen: torch.Tensor, after: int) -> torch.Tenso
     return torch.from_numpy(np.where(objects > 0, objects + after, 0))
 
 
-def _hangs_together(seen: Perception, ids: torch.Tensor) -> torch.Tensor:
-    """(Q,) bool: which points of objects (Q,), 0 for none, may speak for how those went.
+def _speaking(seen: Perception, ids: torch.Tensor) -> torch.Tensor:
+    """(Q,) bool: which points of objects (Q,), 0 for none, may speak for how those went."""
+    speaks = hang_together(to_arrays(seen.position), to_indices(ids), to_indices(seen.frame))
+    return torch.from_numpy(speaks).to(ids.device)
 
-    In each frame what hangs together, seen from above, and is no small share of the object: an echo
-    of the rain before a car would be its foremost point.
+
+def hang_together(
+    positions: NDArray[np.float64], objects: NDArray[np.int64], frame: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Which points (N,) are in an object, and in their frame no small share apart from its rest.
+
+    An echo of the rain before a car would be its foremost point.
+
+    Args:
+        positions: (N, 3) metres.
+        objects: (N,), 0 for none.
+        frame: (N,).
     """
-    position, object_, frame = to_arrays(seen.position), to_indices(ids), to_indices(seen.frame)
-    speaks = np.zeros(len(ids), dtype=np.bool_)
-    for one in np.unique(object_[object_ > 0]):
-        mine = np.flatnonzero(object_ == one)
+    together = np.zeros(len(objects), dtype=np.bool_)
+    for one in np.unique(objects[objects > 0]):
+        mine = np.flatnonzero(objects == one)
         for when in np.unique(frame[mine]):
             shown = mine[frame[mine] == when]
-            part = connected_cells(position[shown], GAP_M)
-            _, first = np.unique(voxel_keys(position[shown], VOXEL_M), return_index=True)
+            part = connected_cells(positions[shown], GAP_M)
+            _, first = np.unique(voxel_keys(positions[shown], VOXEL_M), return_index=True)
             counts = np.bincount(part[first], minlength=part.max() + 1)
-            speaks[shown] = counts[part] >= min(STRAY_SHARE * len(first), counts.max())
-    return torch.from_numpy(speaks).to(ids.device)
+            together[shown] = counts[part] >= min(STRAY_SHARE * len(first), counts.max())
+    return together
 
 
 def cluster_by_offsets(
