@@ -56,6 +56,17 @@ def test_a_mover_takes_its_name_to_where_it_stops(still: StillObjects) -> None:
     assert still.name([car(0, 0)]) != [mover]
 
 
+def test_a_wall_that_a_mover_passes_does_not_go_along(still: StillObjects) -> None:
+    ids = ObjectIds()
+    still = StillObjects(ids)
+    mover = ids.new()
+    still.follow(mover, car(3, 0))
+    wall = np.concatenate([car(-8, 0, length=15.0), car(-8, 1.8, length=15.0)])
+    assert still.name([wall], moving={mover}) != [mover]
+    still.follow(mover, car(3, 0))
+    assert still.name([car(3.2, 0)], moving={mover}) == [mover]  # what is left of itself does
+
+
 def test_the_oldest_are_forgotten(monkeypatch: pytest.MonkeyPatch, still: StillObjects) -> None:
     monkeypatch.setattr(still_objects, "MOST_OBJECTS", 3)
     first = still.name([car(0, 0)])

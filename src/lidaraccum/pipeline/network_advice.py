@@ -120,7 +120,7 @@ class NetworkAdvice:
         if reading is None:
             return
         rows, level = _standing(frame)
-        self._follow_movers(rows, level, canvas)
+        moving = self._follow_movers(rows, level, canvas)
         movable = self._places.probability(level)
         free = (movable > MOVABLE_ABOVE) & (canvas.instances(rows) == 0)
         rows, level, movable = rows[free], level[free], movable[free]
@@ -129,7 +129,7 @@ class NetworkAdvice:
         told = (cluster >= 0) & apart
         counts = np.bincount(cluster[told], minlength=int(cluster.max(initial=0)) + 1)
         groups = [np.flatnonzero(cluster == one) for one in np.flatnonzero(counts >= STILL_POINTS)]
-        names = self._still.name([level[group] for group in groups])
+        names = self._still.name([level[group] for group in groups], moving)
         points = frame.registered.frame.points
         for name, group in zip(names, groups, strict=True):
             judged = apart[group].all() and movable[group].mean() < SURE_ABOVE
@@ -155,12 +155,14 @@ class NetworkAdvice:
 
     def _follow_movers(
         self, rows: NDArray[np.int64], level: NDArray[np.float64], canvas: Canvas
-    ) -> None:
+    ) -> set[int]:
+        """Takes the places of the frame's movers along; their ids."""
         instances = canvas.instances(rows)
         moving = instances > 0
         instances, level = instances[moving], level[moving]
         for instance in np.unique(instances).tolist():
             self._still.follow(instance, level[instances == instance])
+        return set(instances.tolist())
 
 
 def _standing(frame: SightedFrame) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, OrderedDict
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,9 @@ from lidaraccum.pipeline.places import cell_keys
 
 LEAST_SHARE = 0.1
 """A cluster is the object that has most of its cells, if that is at least this share of them."""
+
+MOVER_SHARE = 0.5
+"""The same of what moves in that very frame: a wall beside it is not to go along."""
 
 MOST_OBJECTS = 4000
 MOST_CELLS = 400
@@ -27,16 +30,19 @@ class StillObjects:
         self._owner: dict[int, int] = {}
         self._cells: OrderedDict[int, set[int]] = OrderedDict()
 
-    def name(self, clusters: Sequence[NDArray[np.float64]]) -> list[int]:
+    def name(
+        self, clusters: Sequence[NDArray[np.float64]], moving: Set[int] = frozenset()
+    ) -> list[int]:
         """Ids of one frame's clusters, each of points (K, 2), metres, world.
 
-        Two clusters never share an id; the larger chooses first.
+        Two clusters never share an id; the larger chooses first. ``moving`` are the ids of what
+        moves in this frame, whose points all go where it goes.
         """
         cells = [_cells(cluster) for cluster in clusters]
         names = [0] * len(clusters)
         given: set[int] = set()
         for number in sorted(range(len(clusters)), key=lambda one: -len(clusters[one])):
-            name = self._known(cells[number], given) or self._ids.new()
+            name = self._known(cells[number], given, moving) or self._ids.new()
             given.add(name)
             names[number] = name
             self._claim(name, cells[number])
@@ -49,10 +55,11 @@ class StillObjects:
             del self._owner[cell]
         self._claim(instance, _cells(points))
 
-    def _known(self, cells: set[int], given: set[int]) -> int | None:
+    def _known(self, cells: set[int], given: set[int], moving: Set[int]) -> int | None:
         votes = Counter(self._owner[cell] for cell in cells if cell in self._owner)
         for name, count in votes.most_common():
-            if name not in given and count >= LEAST_SHARE * len(cells):
+            share = MOVER_SHARE if name in moving else LEAST_SHARE
+            if name not in given and count >= share * len(cells):
                 return name
         return None
 
