@@ -75,7 +75,7 @@ class NetworkSettings:
     fastest_mps: float = 40.0
     rematch_m: tuple[float, ...] = (3.0, 1.5, 0.7)
     finer_m: tuple[float, ...] = (0.7, 0.4, 0.4, 0.4)
-    glance_odds: float = 0.02
+    glance_odds: float = 0.1
     temporal_channels: int = 48
     temporal_blocks: int = 2
     temporal: str = "max"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lidaraccum.training.carried import carried
+from lidaraccum.geometry.carried import carried
 
 FRAMES = 5
 SHIFT = np.array([4.0, 0.5, 0.0])
