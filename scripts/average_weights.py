@@ -3,8 +3,9 @@
 Usage: average_weights.py WEIGHTS WEIGHTS... -o OUT [--ego-pillars N] [--tubes WEIGHTS]
 
 Source: Wortsman et al., "Model soups" (ICML 2022). The runs may differ in seed and recipe, the
-networks only in how much they look at: the mean as the first, and as many pillars as it is told.
-And in TubeNet, where one is named whose TubeNet the mean is to have: it then looks as that one.
+networks only in how many pillars they match and which they glance at: the mean as the first, or as
+it is told. And in TubeNet, where one is named whose TubeNet the mean is to have: it then glances as
+that one.
 """
 
 from __future__ import annotations

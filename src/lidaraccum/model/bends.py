@@ -9,6 +9,7 @@ from __future__ import annotations
 import torch
 
 from lidaraccum.model.kabsch import exactly
+from lidaraccum.model.quaternion import about_vertical, rotation_of
 
 _LEAST_RAD = 1e-4
 
@@ -37,6 +38,4 @@ def _chord(bend: torch.Tensor) -> torch.Tensor:
 
 def _turned(way: torch.Tensor, angle: torch.Tensor) -> torch.Tensor:
     with exactly(way):
-        cos, sin = torch.cos(angle), torch.sin(angle)
-        x, y, z = way.unbind(dim=-1)
-        return torch.stack([cos * x - sin * y, sin * x + cos * y, z], dim=-1)
+        return (rotation_of(about_vertical(angle)) @ way[..., None])[..., 0]

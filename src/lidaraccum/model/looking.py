@@ -62,16 +62,20 @@ class View:
         return frame, aligned, torch.tensor(gaps, device=point.device).float()[frame]
 
     def ask(
-        self, head: PointHead, point: torch.Tensor
+        self,
+        head: PointHead,
+        point: torch.Tensor,
+        frame: torch.Tensor,
+        aligned: torch.Tensor,
+        seconds: torch.Tensor,
     ) -> tuple[tuple[torch.Tensor, ...], torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
-        """What the head says of points (Q,), ascending.
+        """What the head says of points (Q,), ascending, whose `place` is known.
 
         Returns:
             Features of each frame's own (k, D), foreground and dynamic logits (Q,), offsets (Q, 2)
             from the points' ego-aligned places, and the base features (Q, C) that were read.
         """
         frames = self.frames
-        frame, aligned, seconds = self.place(point)
         xyz, pillar = frames.points[point], frames.pillar[point]
         told = torch.cat(
             [
@@ -113,7 +117,7 @@ class View:
         doubtful = torch.nonzero(doubtful_pillars(foreground, least_odds))[:, 0]
         count = torch.bincount(frames.pillar, minlength=len(foreground))
         middle = (count.cumsum(0) - count + count // 2)[doubtful]
-        _, glanced, *_ = self.ask(head, middle)
+        _, glanced, *_ = self.ask(head, middle, *self.place(middle))
         passed[doubtful] = close_pillars(glanced)
         return points_of(frames, passed)
 

@@ -299,7 +299,9 @@ class Network(nn.Module):
         frame, position, seconds = view.place(points)
         every = len(points) // most + 1 if most else 1
         spoken, speaker = speakers_of(frames.pillar[points], every)
-        feature, foreground, dynamic, offset, own_base = view.ask(self.point_head, points[spoken])
+        feature, foreground, dynamic, offset, own_base = view.ask(
+            self.point_head, points[spoken], frame[spoken], position[spoken], seconds[spoken]
+        )
         aside = position[spoken[speaker], :2] - position[:, :2]  # all point to the same centre
         return Perception(
             windows, points, frame, position,

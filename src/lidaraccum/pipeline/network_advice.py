@@ -160,9 +160,10 @@ class NetworkAdvice:
         instances = canvas.instances(rows)
         moving = instances > 0
         instances, level = instances[moving], level[moving]
-        for instance in np.unique(instances).tolist():
+        names = set(np.unique(instances).tolist())
+        for instance in sorted(names):
             self._still.follow(instance, level[instances == instance])
-        return set(instances.tolist())
+        return names
 
 
 def _standing(frame: SightedFrame) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

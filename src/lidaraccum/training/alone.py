@@ -58,7 +58,8 @@ def answer_alone(
     frames, target = features.frames, windows.target[0]
     poses = own_poses(windows, target_from_source)
     seen = network.perceive(features, poses, windows, most=MOST_POINTS)
-    movable = (seen.foreground > 0) & ~_carried(frames, seen, poses)
+    movable = seen.foreground > 0
+    movable[_carried(frames, seen, poses, movable)] = False
     moving = movable if "motion" in without else movable & (seen.dynamic > 0)
     if "offsets" in without:
         seen = replace(seen, offset=torch.zeros_like(seen.offset))
@@ -98,10 +99,11 @@ def own_poses(windows: Windows, target_from_source: torch.Tensor) -> torch.Tenso
     return poses.index_copy(0, torch.tensor(windows.sources, device=proposed.device), proposed)
 
 
-def _carried(frames: FrameTensors, seen: Perception, poses: torch.Tensor) -> torch.Tensor:
-    """(Q,) bool: which of the points that seem movable are the sensor's own carrier."""
-    stays = torch.zeros_like(seen.point, dtype=torch.bool)
-    movable = seen.foreground > 0
+def _carried(
+    frames: FrameTensors, seen: Perception, poses: torch.Tensor, movable: torch.Tensor
+) -> torch.Tensor:
+    """(Q,) bool: which of the movable points (Q,) bool are the sensor's own carrier."""
+    stays = torch.zeros_like(movable)
     frame, point = seen.frame[movable], seen.point[movable]
     sensor = move(invert(frames.level_from_sensor)[frame], frames.points[point][:, None])[:, 0]
     gone = poses[:, :3, 3]

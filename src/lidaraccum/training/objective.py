@@ -199,13 +199,10 @@ def _points_to_teach(
     glanced = points_of(features.frames, doubtful_pillars(features.foreground, glance_odds))
     glanced = glanced[(truth.annotated & ~truth.foreground)[glanced]]
     aside = min(len(glanced), most // 3, (len(points) + 1) // 2)
-    if aside:
-        lot = torch.rand(len(glanced), generator=generator).to(device)
-        score = features.foreground.detach()[features.frames.pillar[glanced]]
-        key = score - torch.log(-torch.log(lot.clamp(1e-7, 1.0 - 1e-7)))  # drawn by their odds
-        glanced = glanced[torch.topk(key, aside).indices]
-    else:
-        glanced = glanced[:0]
+    lot = torch.rand(len(glanced), generator=generator).to(device)
+    score = features.foreground.detach()[features.frames.pillar[glanced]]
+    key = score - torch.log(-torch.log(lot.clamp(1e-7, 1.0 - 1e-7)))  # drawn by their odds
+    glanced = glanced[torch.topk(key, aside).indices]
     if len(points) > most - aside:
         kept = torch.randperm(len(points), generator=generator)[: most - aside].to(device)
         points = points[kept]
