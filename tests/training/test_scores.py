@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import torch
 
+from lidaraccum.model.answers import FrameFeatures, ObjectMotions, Perception
 from lidaraccum.model.batch import FrameTensors, to_arrays
 from lidaraccum.model.kabsch import chain, invert, move
 from lidaraccum.model.looking import close_pillars, points_of
 from lidaraccum.model.motion import Windows
-from lidaraccum.model.network import FrameFeatures, ObjectMotions, Perception
 from lidaraccum.model.tubes import gather_tubes
 from lidaraccum.training.alone import cluster_by_offsets
 from lidaraccum.training.end_to_end import goal_of
@@ -67,17 +67,21 @@ class Oracle:
         return SimpleNamespace(target_from_source=poses)
 
     def perceive(
-        self,
-        features: FrameFeatures,
-        poses: torch.Tensor,
-        windows: Windows,
-        points: torch.Tensor | None = None,
-        *,
-        most: int = 0,
+        self, features: FrameFeatures, poses: torch.Tensor, windows: Windows, *, most: int = 0
     ) -> Perception:
-        if points is None:
-            points = points_of(features.frames, close_pillars(features.foreground))
-        frames, truth = features.frames, self.batch.truth
+        view = self.view(features, poses, windows)
+        return self.look(view, self.choose(view, features))
+
+    def view(
+        self, features: FrameFeatures, poses: torch.Tensor, windows: Windows
+    ) -> SimpleNamespace:
+        return SimpleNamespace(frames=features.frames, poses=poses, windows=windows)
+
+    def choose(self, view: SimpleNamespace, features: FrameFeatures) -> torch.Tensor:
+        return points_of(features.frames, close_pillars(features.foreground))
+
+    def look(self, view: SimpleNamespace, points: torch.Tensor) -> Perception:
+        frames, poses, windows, truth = view.frames, view.poses, view.windows, self.batch.truth
         frame = frames.point_frame[points]
         target = windows.target[0]
         level = chain(frames.level_from_sensor[target], poses, invert(frames.level_from_sensor))

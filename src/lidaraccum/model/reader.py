@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from lidaraccum.data.frame import Frame
 from lidaraccum.errors import InputError
 from lidaraccum.geometry import rigid
+from lidaraccum.model.answers import FrameFeatures, Perception
 from lidaraccum.model.batch import prepare, to_arrays, to_indices, to_tensors
 from lidaraccum.model.bytes import in_bytes
 from lidaraccum.model.checkpoint import load_network
 from lidaraccum.model.motion import Windows
-from lidaraccum.model.network import MOST_POINTS, FrameFeatures, Network, Perception
+from lidaraccum.model.network import MOST_POINTS, Network
 from lidaraccum.model.precision import inference
 from lidaraccum.model.reading import FrameReading, ObjectReading, WindowReading
 from lidaraccum.model.weights import weights_hash

@@ -6,8 +6,9 @@ from typing import Literal, get_args
 
 import torch
 
+from lidaraccum.model.answers import FrameFeatures
 from lidaraccum.model.kabsch import chain
-from lidaraccum.model.network import FrameFeatures, Network
+from lidaraccum.model.network import Network
 from lidaraccum.model.precision import inference
 from lidaraccum.training.alone import answer_alone
 from lidaraccum.training.end_to_end import EndToEnd, score_answer

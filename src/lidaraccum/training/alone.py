@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from lidaraccum.geometry.carried import carried
 from lidaraccum.geometry.clustering import connected_cells, dense_groups
 from lidaraccum.geometry.voxel import voxel_keys
+from lidaraccum.model.answers import FrameFeatures, Perception
 from lidaraccum.model.batch import FrameTensors, to_arrays, to_indices
 from lidaraccum.model.kabsch import chain, invert, move
 from lidaraccum.model.motion import Windows
-from lidaraccum.model.network import MOST_POINTS, FrameFeatures, Network, Perception
+from lidaraccum.model.network import MOST_POINTS, Network
 
 VOXEL_M = 0.15
 """The paper, section 3.4: points are thinned before they are clustered."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import torch
 from torch.nn import functional
 
+from lidaraccum.model.answers import ObjectMotions
 from lidaraccum.model.ego_motion import EgoMatch
 from lidaraccum.model.kabsch import about, chain, invert, move
-from lidaraccum.model.network import ObjectMotions
 from lidaraccum.model.quaternion import quaternion_of
 
 LARGEST_CLASS_WEIGHT = 50.0

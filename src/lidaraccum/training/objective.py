@@ -8,9 +8,10 @@ from typing import Literal
 import torch
 
 from lidaraccum.errors import SettingsError
+from lidaraccum.model.answers import FrameFeatures, ObjectMotions, Perception
 from lidaraccum.model.kabsch import chain, compose, invert, move
 from lidaraccum.model.looking import close_pillars, doubtful_pillars, points_of
-from lidaraccum.model.network import FrameFeatures, Network, ObjectMotions, Perception
+from lidaraccum.model.network import Network
 from lidaraccum.model.quaternion import rotation_of
 from lidaraccum.training.clusters import ClusterSettings, imperfect_clusters, truth_of_clusters
 from lidaraccum.training.losses import (

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from lidaraccum.metrics import segmentation
 from lidaraccum.metrics.flow import FlowErrors, flow_errors
 from lidaraccum.metrics.segmentation import SegmentationCounts
+from lidaraccum.model.answers import Perception
 from lidaraccum.model.batch import to_arrays
 from lidaraccum.model.kabsch import move
-from lidaraccum.model.network import Network, Perception
+from lidaraccum.model.network import Network
 from lidaraccum.model.precision import inference
 from lidaraccum.training.alone import answer_alone
 from lidaraccum.training.end_to_end import EndToEnd, score_answer
@@ -55,11 +56,11 @@ def score_stages(network: Network, batch: Batch) -> StageScores:
     with inference(batch.frames.points.device):
         features = network.encode(batch.frames)
         match = network.match_windows(features, batch.windows)
-        true_poses = (features, truth.target_from_frame, batch.windows)
+        view = network.view(features, truth.target_from_frame, batch.windows)
         close = torch.zeros_like(truth.foreground)
-        close[network.perceive(*true_poses).point] = True
+        close[network.choose(view, features)] = True
         points = torch.nonzero(close | (truth.object_row >= 0))[:, 0]
-        told = network.perceive(*true_poses, points)
+        told = network.look(view, points)
         objects, still = _object_errors(network, batch, told)
         answer = answer_alone(network, features, batch.windows, match.target_from_source)
     foreground, motion = _segmentation(batch, told, close[points])
