@@ -11,7 +11,7 @@ import torch
 from lidaraccum.errors import SettingsError
 from lidaraccum.geometry import rigid
 from lidaraccum.model.edges import DIRECTIONS, EdgeShift, StraightOn
-from lidaraccum.model.settings import NetworkSettings
+from lidaraccum.model.settings import TUBES, NetworkSettings
 from lidaraccum.model.tube_net import TubeNet
 from lidaraccum.model.tubes import Tubes, centroid_gap, gather_tubes
 
@@ -62,7 +62,7 @@ def trust_all_alike(edges: EdgeShift) -> None:
         edges.trust[1].weight[0, 0] = 1.0
 
 
-@pytest.mark.parametrize("tube", ["sides", "edges", "centroid"])
+@pytest.mark.parametrize("tube", TUBES)
 def test_a_fresh_net_knows_how_far_a_car_seen_whole_has_gone(tube: str) -> None:
     settings = NetworkSettings(tube=tube)
     net = TubeNet(settings)
@@ -173,6 +173,6 @@ def test_what_the_anchor_alone_has_wrong_is_found_where_it_may_be(cost: float, l
     assert error < left if cost < 0.0 else 0.5 < error < left
 
 
-def test_there_are_three_kinds() -> None:
-    with pytest.raises(SettingsError, match="sides, edges or centroid"):
+def test_there_are_four_kinds() -> None:
+    with pytest.raises(SettingsError, match="centroid, edges, sides, overlap"):
         replace(NetworkSettings(), tube="corners")

@@ -18,7 +18,7 @@ def deepened(network: Network, settings: NetworkSettings) -> Network:
     """A network with as many levels as the settings ask for, which says what this one says.
 
     Where the settings ask for another kind of TubeNet, a fresh one takes the trained one's place;
-    only one that asks sides begins as one that asks edges, but for how objects turn.
+    only one that asks more than edges begins as the trained one, but for what that did not ask.
 
     Args:
         network: Trained. It is returned as it is where the settings ask for no more levels, or for
@@ -52,7 +52,7 @@ def deepened(network: Network, settings: NetworkSettings) -> Network:
             name: values[:4].clone() for name, values in grown.tube_net.last.named_parameters()
         }
         grown.load_state_dict(rest, strict=False)
-        if deeper.tube != own.tube:
+        if deeper.tube_asks("sides") and not own.tube_asks("sides"):
             for name, values in grown.tube_net.last.named_parameters():
                 values[:4] = turns[name]
     channels_last(grown)

@@ -219,7 +219,7 @@ class Network(nn.Module):
         time = frame - first[of_frame[frame]]
         window = torch.zeros_like(ids).index_copy(0, row, of_frame[frame])
         shown = torch.arange(len(chosen), device=device)
-        if self.settings.tube == "sides":
+        if self.settings.tube_asks("sides"):
             slot = row * max(lengths) + time
             shown = one_of_each_cell(perception.position[chosen], slot, TUBE_CELL_M)
         asked = chosen[shown]

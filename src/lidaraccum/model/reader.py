@@ -161,7 +161,7 @@ class NetworkReader:
         seen, places = kept.perception, list(kept.places)
         frame, rows = to_indices(seen.frame), to_indices(kept.features.frames.rows[seen.point])
         ids = np.zeros(len(rows), dtype=np.int64)
-        thins = self._network.settings.tube == "sides"
+        thins = self._network.settings.tube_asks("sides")
         for order, place in enumerate(places):
             own = frame == order
             named = instances[place][rows[own]]

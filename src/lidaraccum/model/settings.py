@@ -12,6 +12,9 @@ COARSEST_CELLS = 16
 EFFORT = ("extent_m", "pillar_points", "ego_pillars", "ground_pillars", "finer_m", "glance_odds")
 """Settings that say how much is looked at. Weights fit any, best those they learned with."""
 
+TUBES = ("centroid", "edges", "sides", "overlap")
+"""Kinds of TubeNet: from edges on each asks all that those before it ask, and one thing more."""
+
 
 @dataclass(frozen=True)
 class NetworkSettings:
@@ -51,9 +54,9 @@ class NetworkSettings:
         motion_widths: Channels of the motion U-Net by level, from half resolution on; the first
             is that of the motion features.
         point_channels: Channels of a point's motion features.
-        tube: How an object's motion is had: by its ``sides`` and edges, of its points thinned to
-            one of each cell; by its ``edges``; or as a share of the gap between its centroids
-            (``centroid``); see `model.tube_net`.
+        tube: How an object's motion is had, one of `TUBES`: as a share of the gap between its
+            centroids; by its edges; by its sides, too, of its points thinned to one of each cell;
+            and by how much of it then overlaps with itself; see `model.tube_net`.
         tube_channels: Channels of what TubeNet says of an object's positions in one frame.
     """
 
@@ -81,7 +84,7 @@ class NetworkSettings:
     temporal: str = "max"
     motion_widths: tuple[int, ...] = (64, 96, 128, 160)
     point_channels: int = 128
-    tube: str = "sides"
+    tube: str = "overlap"
     tube_channels: int = 128
 
     def __post_init__(self) -> None:
@@ -94,13 +97,17 @@ class NetworkSettings:
             raise SettingsError("a U-Net has 2 to 5 levels (base), 2 to 4 (motion)")
         if self.temporal not in ("max", "decay"):
             raise SettingsError(f"temporal is max or decay, not {self.temporal!r}")
-        if self.tube not in ("sides", "edges", "centroid"):
-            raise SettingsError(f"tube is sides, edges or centroid, not {self.tube!r}")
+        if self.tube not in TUBES:
+            raise SettingsError(f"tube is one of {', '.join(TUBES)}, not {self.tube!r}")
         if min(self.standing_odds, self.glance_odds) <= 0.0:
             raise SettingsError("standing_odds and glance_odds are more than 0")
         if self.lowest_m >= self.highest_m:
             raise SettingsError("lowest_m must be below highest_m")
         self.cells(self.extent_m)
+
+    def tube_asks(self, kind: str) -> bool:
+        """Whether TubeNet asks what one of `TUBES` is named after: it asks all up to its own."""
+        return TUBES.index(self.tube) >= TUBES.index(kind)
 
     def with_effort(self, other: NetworkSettings) -> NetworkSettings:
         """These settings with another's `EFFORT`."""

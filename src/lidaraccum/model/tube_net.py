@@ -10,6 +10,7 @@ from torch import nn
 from lidaraccum.model.bends import bend_of, bent, unbent
 from lidaraccum.model.edges import EdgeShift, StraightOn
 from lidaraccum.model.kabsch import chain, compose, exactly, move
+from lidaraccum.model.overlap import Overlap
 from lidaraccum.model.pooling import tallest
 from lidaraccum.model.quaternion import about_vertical, rotation_of
 from lidaraccum.model.settings import NetworkSettings
@@ -35,8 +36,8 @@ class TubeMotions:
     """What TubeNet proposes for K objects and T times.
 
     Attributes:
-        quaternion: For each iteration (K, T, 4), w x y z, as regressed, not normalised: of the
-            step that iteration adds.
+        quaternion: For each iteration, the laying over itself being one more, (K, T, 4), w x y z,
+            as regressed, not normalised: of the step that iteration adds.
         shift: For each iteration (K, T, 3) metres: of that step.
         anchor_from_time: For each iteration (K, T, 4, 4): all steps up to it, in coordinates about
             the object's anchor, level axes. The identity for the anchor's own time and for times
@@ -53,7 +54,8 @@ class TubeNet(nn.Module):
 
     Ours: the turn is what the object's sides say, plus a correction; the shift is what its edges
     and its centroid say, once it is turned, weighted, plus a correction, and drawn towards steady
-    motion; the net is told from where the object is seen. With ``tube = "edges"`` sides are not
+    motion; at last the object is laid over itself along that way. The net is told from where the
+    object is seen. With ``tube = "sides"`` nothing is laid over; with ``"edges"`` sides are not
     asked; with ``"centroid"`` the shift is a share of the gap between the centroids plus a
     correction.
 
@@ -63,7 +65,7 @@ class TubeNet(nn.Module):
     def __init__(self, settings: NetworkSettings) -> None:
         super().__init__()
         wide = settings.tube_channels
-        by_edges = settings.tube in ("edges", "sides")
+        by_edges = settings.tube_asks("edges")
         self.motion = nn.Sequential(linear(settings.point_channels, 64), nn.ReLU(inplace=True))
         self.ego = nn.Sequential(linear(settings.base_widths[0], 64), nn.ReLU(inplace=True))
         self.place = nn.Sequential(
@@ -86,8 +88,9 @@ class TubeNet(nn.Module):
         nn.init.normal_(self.last.weight, std=1e-5)
         nn.init.zeros_(self.last.bias)  # the identity: see `_identity`
         self.edges = EdgeShift(_SAID) if by_edges else None
-        self.straight = StraightOn(_SAID, settings.tube == "sides") if by_edges else None
-        self.sides = SideTurn(_SAID) if settings.tube == "sides" else None
+        self.straight = StraightOn(_SAID, settings.tube_asks("sides")) if by_edges else None
+        self.sides = SideTurn(_SAID) if settings.tube_asks("sides") else None
+        self.overlap = Overlap(_SAID) if settings.tube_asks("overlap") else None
 
     def forward(self, tubes: Tubes, motion: torch.Tensor, base: torch.Tensor) -> TubeMotions:
         """Motions of K objects, from features (Q, D) and (Q, C) of their points."""
@@ -107,17 +110,23 @@ class TubeNet(nn.Module):
         quaternions, shifts, totals = [], [], []
         for _ in range(ITERATIONS):
             total = total.detach()
-            quaternion, shift = self._step(tubes, general, total)
+            quaternion, shift, said = self._step(tubes, general, total)
             total = chain(compose(rotation_of(quaternion), shift), total)
             quaternions.append(quaternion)
             shifts.append(shift)
             totals.append(total)
+        if self.overlap is not None:
+            total = total.detach()
+            shift = self._lay_over(self.overlap, tubes, said, total)
+            quaternions.append(_identity(quaternion))
+            shifts.append(shift)
+            totals.append(chain(compose(rotation_of(quaternions[-1]), shift), total))
         return TubeMotions(tuple(quaternions), tuple(shifts), tuple(totals))
 
     def _step(
         self, tubes: Tubes, general: torch.Tensor, total: torch.Tensor
-    ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Quaternion (K, T, 4) and shift (K, T, 3) of this iteration."""
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Quaternion (K, T, 4) and shift (K, T, 3) of this iteration, and what led to them."""
         count, span = tubes.counts.shape
         moved = move_points(total, tubes)
         if self.sides is None:
@@ -125,7 +134,8 @@ class TubeNet(nn.Module):
         else:
             gone = centre_by_time(moved, tubes) - centre_by_time(tubes.relative, tubes)
         place = self.place(torch.cat([moved / LENGTH_M, tubes.seconds[:, None]], dim=1))
-        summary = tallest(torch.relu(place), tubes.slot(), count * span).view(count, span, -1)
+        summary = tallest(torch.relu(place), tubes.slot(), count * span)
+        summary = summary.view(count, span, place.shape[1])
         gap = centroid_gap(moved, tubes)
         ahead = torch.arange(span, device=moved.device)[None] - tubes.anchor_time[:, None]
         known = [
@@ -159,7 +169,16 @@ class TubeNet(nn.Module):
             bend = bend_of(turn @ total[..., :3, :3])
             straightened = unbent(gone + shift, bend)
             shift = aside + shift + bent(self.straight(tubes, said, straightened), bend)
-        return quaternion, torch.where(fixed, 0.0, shift)
+        return quaternion, torch.where(fixed, 0.0, shift), said
+
+    def _lay_over(
+        self, overlap: Overlap, tubes: Tubes, said: torch.Tensor, total: torch.Tensor
+    ) -> torch.Tensor:
+        """Shifts (K, T, 3) along the ways that objects, moved so far, are on."""
+        moved = move_points(total, tubes)
+        gone = centre_by_time(moved, tubes) - centre_by_time(tubes.relative, tubes)
+        bend = bend_of(total[..., :3, :3])
+        return bent(overlap(tubes, said, moved, unbent(gone, bend)), bend)
 
 
 def _circumstances(tubes: Tubes, gone: torch.Tensor) -> list[torch.Tensor]:

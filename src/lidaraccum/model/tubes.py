@@ -126,6 +126,19 @@ def one_of_each_cell(position: torch.Tensor, slot: torch.Tensor, cell_m: float) 
     return torch.sort(first.scatter_reduce(0, place, rows, "amin")).values
 
 
+def some_of_each(slot: torch.Tensor, counts: torch.Tensor, most: int) -> torch.Tensor:
+    """(R,) int64: every so many points of each slot, in order: up to twice ``most`` less one.
+
+    Args:
+        slot: (Q,) int64, 0..S-1.
+        counts: (S,) int64 of points in each.
+        most: How many are enough.
+    """
+    order = torch.argsort(slot, stable=True)
+    rank = torch.arange(len(slot), device=slot.device) - (counts.cumsum(0) - counts)[slot[order]]
+    return order[rank % (counts // most).clamp_min(1)[slot[order]] == 0]
+
+
 def centre_by_time(moved: torch.Tensor, tubes: Tubes) -> torch.Tensor:
     """(K, T, 3) metres: mean of an object's moved points (Q, 3) at each time; 0 for none."""
     sums = moved.new_zeros(tubes.counts.numel(), 3).index_add(0, tubes.slot(), moved)

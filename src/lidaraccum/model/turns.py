@@ -11,7 +11,7 @@ import math
 import torch
 from torch import nn
 
-from lidaraccum.model.tubes import Tubes, centre_by_time
+from lidaraccum.model.tubes import Tubes, centre_by_time, some_of_each
 
 DIRECTIONS = 90
 """Of half a turn, evenly about, across which points are projected."""
@@ -105,11 +105,7 @@ def _heaps(flat: torch.Tensor, slot: torch.Tensor, counts: torch.Tensor) -> torc
         slot: (Q,) int64, 0..S-1.
         counts: (S,) of points in each.
     """
-    order = torch.argsort(slot, stable=True)
-    rank = torch.arange(len(slot), device=slot.device)
-    first = (counts.cumsum(0) - counts)[slot[order]]
-    every = (counts // _MOST_POINTS).clamp_min(1)[slot[order]]
-    chosen = order[(rank - first) % every == 0]
+    chosen = some_of_each(slot, counts, _MOST_POINTS)
     flat, slot = flat[chosen], slot[chosen]
     angle = torch.arange(DIRECTIONS, device=flat.device) * (math.pi / DIRECTIONS)
     across = flat @ torch.stack([torch.cos(angle), torch.sin(angle)]) / BIN_M + _BINS / 2

@@ -12,7 +12,8 @@ from lidaraccum.model.quaternion import quaternion_of
 
 LARGEST_CLASS_WEIGHT = 50.0
 INLIER_WEIGHT = 0.005
-ITERATION_WEIGHTS = (0.7, 1.0)
+ITERATION_WEIGHTS = (0.7, 1.0, 1.0)
+"""Of TubeNet's two iterations; where it lays objects over themselves, of that."""
 STILL_WEIGHT = 0.2
 FEWEST_POINTS = 30
 """Frames in which an object has so few points, thinned, teach nothing about its motion."""
@@ -105,7 +106,7 @@ def object_loss(
     before = torch.eye(4, device=truth.device).expand_as(truth)
     total = truth.new_zeros(())
     steps = zip(
-        ITERATION_WEIGHTS,
+        ITERATION_WEIGHTS[: len(objects.motions.shift)],
         objects.motions.quaternion,
         objects.motions.shift,
         objects.motions.anchor_from_time,
