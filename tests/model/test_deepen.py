@@ -72,6 +72,15 @@ def test_a_tube_net_that_asks_sides_begins_as_one_that_asks_edges(network: Netwo
     }
 
 
+def test_a_tube_net_that_lays_over_begins_as_one_that_asks_sides(network: Network) -> None:
+    sides = build_network(replace(network.settings, tube="sides"), seed=7)
+    grown = deepened(sides, replace(network.settings, tube="overlap")).state_dict()
+    for name, values in sides.state_dict().items():
+        assert torch.equal(values, grown[name])
+    added = {name for name in grown if name not in sides.state_dict()}
+    assert {name.rsplit(".", 3)[0] for name in added} == {"tube_net.overlap.say"}
+
+
 def test_the_levels_added_learn_from_the_second_step_on(
     network: Network, frames: list[Frame]
 ) -> None:

@@ -1,4 +1,4 @@
-"""How far an object has gone along its way, by how much of it then lies where it lay before.
+"""How far an object has gone, by how much of it then lies where it lies at other times.
 
 What is seen of a vehicle that passes close by ends where the view of it ends, not where the vehicle
 does: its edges and its centroid err together, by a metre. Its wheels, mirrors and pillars do not.
@@ -14,12 +14,43 @@ from torch import nn
 
 from lidaraccum.model.tubes import LENGTH_M, Tubes, centre_by_time, some_of_each
 
-CELLS = (24, 16, 128)
-CELL_M = (0.2, 0.25, 0.15)
-"""Of the grid on which points are laid over each other: across the way, upwards, along it."""
-FURTHEST_M = 2.5
-_STEPS = 51
-"""Ways tried go this much further or less far, at the time furthest from the anchor's."""
+
+@dataclass(frozen=True)
+class Round:
+    """Ways tried that differ along one axis.
+
+    Attributes:
+        axis: 0 along the object's way, 1 across it, 2 upwards.
+        furthest_m: Ways go so much further or less far, at the time furthest from the anchor's.
+        steps: How many are tried.
+        cell_m: Of the grid on which points are laid over each other: along, across, upwards.
+    """
+
+    axis: int
+    furthest_m: float
+    steps: int
+    cell_m: tuple[float, float, float]
+
+    @property
+    def order(self) -> tuple[int, int, int]:
+        """The axes, that of this round last."""
+        first, second = (axis for axis in range(3) if axis != self.axis)
+        return first, second, self.axis
+
+    @property
+    def cells(self) -> tuple[int, ...]:
+        """Of the grid, in that order."""
+        return tuple(2 * round(HALF_M[axis] / self.cell_m[axis]) for axis in self.order)
+
+
+HALF_M = (9.6, 2.4, 2.0)
+"""Half of the grid's length, width and height; what lies beyond says nothing."""
+ROUNDS = (
+    Round(1, 0.5, 21, (0.3, 0.1, 0.25)),
+    Round(2, 0.3, 13, (0.3, 0.2, 0.1)),
+    Round(0, 2.5, 51, (0.15, 0.2, 0.25)),
+    Round(0, 0.6, 25, (0.1, 0.15, 0.25)),
+)
 FEWEST_POINTS = 10
 """Times that show fewer say nothing."""
 _MOST_POINTS = 256
@@ -32,25 +63,16 @@ _CIRCUMSTANCES = 6
 
 
 class Overlap(nn.Module):
-    """The way along its course by which most of an object's points lie where other times have some.
+    """The way by which most of an object's points lie where other times have some.
 
     Each time is laid over the anchor's and over those beside it. Ways go further or less far by the
-    same speed at all times; which one is taken is weighed against going on as is known so far. How
-    much either counts is learned.
+    same speed at all times, across the course first; which one is taken is weighed against going
+    on as is known so far. How much either counts is learned.
     """
-
-    further: torch.Tensor
 
     def __init__(self, channels: int) -> None:
         super().__init__()
-        last = nn.Linear(32, 2)
-        nn.init.normal_(last.weight, std=1e-3)  # all objects alike at first
-        nn.init.zeros_(last.bias)
-        self.say = nn.Sequential(
-            nn.Linear(channels + _CIRCUMSTANCES, 32), nn.ReLU(inplace=True), last
-        )
-        further = torch.linspace(-FURTHEST_M, FURTHEST_M, _STEPS)
-        self.register_buffer("further", further, persistent=False)
+        self.say = nn.ModuleList(_head(channels) for _ in ROUNDS)
 
     def forward(
         self, tubes: Tubes, said: torch.Tensor, moved: torch.Tensor, gone: torch.Tensor
@@ -64,146 +86,129 @@ class Overlap(nn.Module):
             gone: (K, T, 3) metres they were shifted so far, ways laid straight.
         """
         seconds = tubes.seconds_by_time()
-        speed = (gone[..., :2] * seconds[..., None]).sum(dim=1)
-        course = nn.functional.normalize(speed, dim=1)
+        axes = _axes((gone * seconds[..., None]).sum(dim=1))
         share = seconds / seconds.abs().amax(dim=1, keepdim=True).clamp_min(1e-3)
-        with torch.no_grad():
-            agreement = self._agreement(tubes, moved, course, share)
+        share = torch.where(tubes.counts > 0, share, 0.0)
         length = torch.linalg.vector_norm(gone, dim=2).amax(dim=1)
-        known = [said.mean(dim=1), *self._describe(tubes, agreement, length)]
-        sharper, nearer = self.say(torch.cat(known, dim=1)).exp().unbind(dim=1)
-        odds = _SHARPNESS * sharper[:, None] * agreement
-        odds = odds - 0.5 * nearer[:, None] * (self.further / FURTHEST_M) ** 2
-        further = (odds.softmax(dim=1) * self.further).sum(dim=1)
-        along = (further[:, None] * torch.where(tubes.fixed(), 0.0, share))[..., None]
-        return torch.cat([along * course[:, None], torch.zeros_like(along)], dim=2)
-
-    def _describe(
-        self, tubes: Tubes, agreement: torch.Tensor, length: torch.Tensor
-    ) -> list[torch.Tensor]:
-        """(K, 6): how well the best way agrees and that so far, by how far; plenty, distance."""
-        best, at = agreement.max(dim=1)
-        none = agreement[:, _STEPS // 2]
-        distance = torch.linalg.vector_norm(tubes.anchor[:, :2], dim=1)
-        described = [
-            best,
-            none,
-            self.further[at].abs() / FURTHEST_M,
-            length / LENGTH_M,
-            tubes.plenty().mean(dim=1),
-            distance / (10.0 * LENGTH_M),
-        ]
-        return [one[:, None] for one in described]
-
-    def _agreement(
-        self, tubes: Tubes, moved: torch.Tensor, course: torch.Tensor, share: torch.Tensor
-    ) -> torch.Tensor:
-        """(K, S) 0..1: share of points that lie on others', were objects to go so much further.
-
-        Args:
-            tubes: Points of K objects over T times.
-            moved: (Q, 3) about the anchors, moved so far.
-            course: (K, 2) unit vectors.
-            share: (K, T) of what is tried by which each time is shifted, -1..1.
-        """
-        count = len(course)
-        total = moved.new_zeros(count, _STEPS)
-        pairs = moved.new_zeros(count, 1)
-        place = _along_course(tubes, moved, course)
-        for first in range(0, count, _MOST_OBJECTS):
-            laid = _Laid.of(tubes, place, first)
-            for row, time, other in laid.pairs(tubes):
-                ahead = place[row, 2:] + self.further * (
-                    share[tubes.instance[row], time] - share[tubes.instance[row], other]
-                ).unsqueeze(1)
-                weight = 1.0 / laid.asked[tubes.slot()[row]][:, None]
-                found = laid.at(tubes.instance[row], other, place[row], ahead)
-                total.index_add_(0, tubes.instance[row], found * weight)
-                pairs.index_add_(0, tubes.instance[row], weight)
-        return total / pairs.clamp_min(1e-6)
+        further = moved.new_zeros(len(gone), 3)
+        place = (axes[tubes.instance] @ _about_middle(tubes, moved)[..., None])[..., 0]
+        for one, say in zip(ROUNDS, self.say, strict=True):
+            away = torch.linspace(-one.furthest_m, one.furthest_m, one.steps, device=moved.device)
+            with torch.no_grad():
+                so_far = share[tubes.instance, tubes.time, None] * further[tubes.instance]
+                agreement = _agreement(tubes, place + so_far, share, one, away)
+            known = [said.mean(dim=1), *_describe(tubes, agreement, away, length)]
+            sharper, nearer = say(torch.cat(known, dim=1)).exp().unbind(dim=1)
+            odds = _SHARPNESS * sharper[:, None] * agreement
+            odds = odds - 0.5 * nearer[:, None] * (away / one.furthest_m) ** 2
+            step = (odds.softmax(dim=1) * away).sum(dim=1)
+            further = further + step[:, None] * further.new_tensor(_UNIT[one.axis])
+        way = (further[:, None] @ axes)[:, 0]
+        return share[..., None] * way[:, None]
 
 
-@dataclass(frozen=True, eq=False)
-class _Laid:
-    """Some of the objects' points on a grid each, for every time.
+_UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
-    Attributes:
-        first: The first of the objects.
-        occupied: (objects, T, across, up, along) uint8: 2 where there are points, 1 beside them.
-        row: (R,) int64 which of the Q points are looked up: some of each time, on the grid.
-        asked: (K T,) how many they are of each time.
+
+def _head(channels: int) -> nn.Sequential:
+    last = nn.Linear(32, 2)
+    nn.init.normal_(last.weight, std=1e-3)  # all objects alike at first
+    nn.init.zeros_(last.bias)
+    return nn.Sequential(nn.Linear(channels + _CIRCUMSTANCES, 32), nn.ReLU(inplace=True), last)
+
+
+def _axes(way: torch.Tensor) -> torch.Tensor:
+    """(K, 3, 3) unit vectors along ways (K, 3) seen from above, across them, and upwards.
+
+    Zero along and across a way of no length.
     """
-
-    first: int
-    occupied: torch.Tensor
-    row: torch.Tensor
-    asked: torch.Tensor
-
-    @classmethod
-    def of(cls, tubes: Tubes, place: torch.Tensor, first: int) -> _Laid:
-        """Of up to so many objects from ``first`` on; place (Q, 3) from `_along_course`."""
-        count, span = tubes.counts.shape
-        some = min(_MOST_OBJECTS, count - first)
-        mine = (tubes.instance >= first) & (tubes.instance < first + some)
-        on_grid = mine & _cell(place)[1]
-        cell = _cell(place[on_grid])[0]
-        slot = tubes.slot()[on_grid] - first * span
-        occupied = torch.zeros(some * span, *CELLS, dtype=torch.uint8, device=place.device)
-        across, up, along = cell.unbind(dim=1)
-        occupied[slot, across, up, along] = 1
-        beside = occupied
-        for axis in (1, 2, 3):
-            beside = _widened(beside, axis)
-        row = some_of_each(tubes.slot(), tubes.counts.flatten(), _MOST_POINTS)
-        row = row[on_grid[row]]
-        asked = torch.bincount(tubes.slot()[row], minlength=count * span).to(place.dtype)
-        return cls(first, (occupied + beside).view(some, span, *CELLS), row, asked)
-
-    def pairs(self, tubes: Tubes) -> Iterator[tuple[torch.Tensor, torch.Tensor, torch.Tensor]]:
-        """Points (R',) int64, their times, and times they are laid over: anchors', next, before."""
-        span = tubes.counts.shape[1]
-        object_of, time = tubes.instance[self.row], tubes.time[self.row]
-        anchor = tubes.anchor_time[object_of]
-        shown = tubes.counts >= FEWEST_POINTS
-        for other, wanted in (
-            (anchor, time != anchor),
-            (time + 1, (time + 1 != anchor) & (time + 1 < span)),
-            (time - 1, (time - 1 != anchor) & (time > 0)),
-        ):
-            there = other.clamp(0, span - 1)
-            both = wanted & shown[object_of, there] & shown[object_of, time]
-            yield self.row[both], time[both], there[both]
-
-    def at(
-        self,
-        object_of: torch.Tensor,
-        time: torch.Tensor,
-        place: torch.Tensor,
-        along: torch.Tensor,
-    ) -> torch.Tensor:
-        """(R', S) 0..1: what there is at a time (R',) where points (R', 3) get, (R', S) along."""
-        cell, _ = _cell(place)
-        further = torch.floor(along / CELL_M[2]).long() + CELLS[2] // 2
-        inside = (further >= 0) & (further < CELLS[2])
-        rows = self.occupied[object_of - self.first, time, cell[:, 0], cell[:, 1]]  # (R', along)
-        return rows.gather(1, further.clamp(0, CELLS[2] - 1)).to(along.dtype) * inside / 2.0
+    x, y = nn.functional.normalize(way[:, :2], dim=1).unbind(dim=1)
+    zero, one = torch.zeros_like(x), torch.ones_like(x)
+    return torch.stack([x, y, zero, -y, x, zero, zero, zero, one], dim=1).view(-1, 3, 3)
 
 
-def _along_course(tubes: Tubes, moved: torch.Tensor, course: torch.Tensor) -> torch.Tensor:
-    """(Q, 3) metres about the middle of all times: across the course, upwards, along it."""
+def _about_middle(tubes: Tubes, moved: torch.Tensor) -> torch.Tensor:
+    """(Q, 3) metres about the middle of an object's places at all times."""
     seen = (tubes.counts > 0)[..., None]
     middle = (centre_by_time(moved, tubes) * seen).sum(dim=1) / seen.sum(dim=1).clamp_min(1)
-    about = moved - middle[tubes.instance]
-    x, y = course[tubes.instance].unbind(dim=1)
-    across = about[:, 1] * x - about[:, 0] * y
-    return torch.stack([across, about[:, 2], about[:, 0] * x + about[:, 1] * y], dim=1)
+    return moved - middle[tubes.instance]
 
 
-def _cell(place: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """Cells (Q, 3) int64 of places (Q, 3), and which of them are on the grid."""
-    size, limit = place.new_tensor(CELL_M), torch.tensor(CELLS, device=place.device)
-    cell = torch.floor(place / size).long() + limit // 2
+def _describe(
+    tubes: Tubes, agreement: torch.Tensor, away: torch.Tensor, length: torch.Tensor
+) -> list[torch.Tensor]:
+    """(K, 1) each: how the best way agrees, and that so far, how far apart; plenty, distance."""
+    best, at = agreement.max(dim=1)
+    described = [
+        best,
+        agreement[:, len(away) // 2],
+        away[at].abs() / away[-1],
+        length / LENGTH_M,
+        tubes.plenty().mean(dim=1),
+        torch.linalg.vector_norm(tubes.anchor[:, :2], dim=1) / (10.0 * LENGTH_M),
+    ]
+    return [one[:, None] for one in described]
+
+
+def _agreement(
+    tubes: Tubes, place: torch.Tensor, share: torch.Tensor, one: Round, away: torch.Tensor
+) -> torch.Tensor:
+    """(K, S) 0..1: share of points that lie on others', were objects to go so much further.
+
+    Args:
+        tubes: Points of K objects over T times.
+        place: (Q, 3) metres along, across, upwards.
+        share: (K, T) of what is tried by which each time is shifted, -1..1.
+        one: What is tried.
+        away: (S,) metres.
+    """
+    count, slot = len(share), tubes.slot()
+    ordered = place[:, one.order]
+    cell, on_grid = _cell(ordered, one)
+    row = some_of_each(slot, tubes.counts.flatten(), _MOST_POINTS)
+    row = row[on_grid[row]]
+    weight = 1.0 / torch.bincount(slot[row], minlength=tubes.counts.numel()).to(place.dtype)
+    total, pairs = place.new_zeros(count, len(away)), place.new_zeros(count, 1)
+    for first in range(0, count, _MOST_OBJECTS):
+        mine = (tubes.instance >= first) & (tubes.instance < first + _MOST_OBJECTS)
+        grid = _occupied(tubes, cell, on_grid & mine, first, one)
+        for index, other in _pairs(tubes, row[mine[row]]):
+            owner, time = tubes.instance[index], tubes.time[index]
+            further = away * (share[owner, time] - share[owner, other])[:, None]
+            along = torch.floor((ordered[index, 2:] + further) / one.cell_m[one.axis]).long()
+            along = along + grid.shape[-1] // 2
+            inside = (along >= 0) & (along < grid.shape[-1])
+            lines = grid[owner - first, other, cell[index, 0], cell[index, 1]]  # (R, cells)
+            found = lines.gather(1, along.clamp(0, grid.shape[-1] - 1)).to(place.dtype) * inside
+            total.index_add_(0, owner, found * weight[slot[index], None] / _ON)
+            pairs.index_add_(0, owner, weight[slot[index], None])
+    return total / pairs.clamp_min(1e-6)
+
+
+def _cell(ordered: torch.Tensor, one: Round) -> tuple[torch.Tensor, torch.Tensor]:
+    """Cells (Q, 3) int64 of places (Q, 3), in the round's order, and which are on the grid."""
+    size = ordered.new_tensor([one.cell_m[axis] for axis in one.order])
+    limit = torch.tensor(one.cells, device=ordered.device)
+    cell = torch.floor(ordered / size).long() + limit // 2
     return cell, ((cell >= 0) & (cell < limit)).all(dim=1)
+
+
+_ON = 2.0
+"""What a grid says where there are points; 1 beside them."""
+
+
+def _occupied(
+    tubes: Tubes, cell: torch.Tensor, shown: torch.Tensor, first: int, one: Round
+) -> torch.Tensor:
+    """(objects, T, *cells) uint8: where objects from ``first`` on have points (Q,) bool."""
+    count, span = tubes.counts.shape
+    some = min(_MOST_OBJECTS, count - first)
+    grid = torch.zeros(some * span, *one.cells, dtype=torch.uint8, device=cell.device)
+    grid[tubes.slot()[shown] - first * span, cell[shown, 0], cell[shown, 1], cell[shown, 2]] = 1
+    beside = grid
+    for axis in (1, 2, 3):
+        beside = _widened(beside, axis)
+    return (grid + beside).view(some, span, *one.cells)
 
 
 def _widened(grid: torch.Tensor, axis: int) -> torch.Tensor:
@@ -213,3 +218,19 @@ def _widened(grid: torch.Tensor, axis: int) -> torch.Tensor:
         there = wide.narrow(axis, to, last)
         torch.maximum(there, grid.narrow(axis, source, last), out=there)
     return wide
+
+
+def _pairs(tubes: Tubes, row: torch.Tensor) -> Iterator[tuple[torch.Tensor, torch.Tensor]]:
+    """Of points (R,) int64 those, and the times, they are laid over: next ones and the anchor's.
+
+    Each pair of times both ways: what cells round off, they round off in opposite directions.
+    """
+    span = tubes.counts.shape[1]
+    owner, time = tubes.instance[row], tubes.time[row]
+    anchor = tubes.anchor_time[owner]
+    shown = tubes.counts >= FEWEST_POINTS
+    for other in range(span):
+        beside = (time - other).abs() == 1
+        home = (time != other) & ((time == anchor) | (anchor == other))
+        both = (beside | home) & shown[owner, other] & shown[owner, time]
+        yield row[both], torch.full_like(row[both], other)
