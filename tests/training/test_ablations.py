@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import torch
 
+from lidaraccum.model.answers import FrameFeatures
 from lidaraccum.model.motion import Windows
-from lidaraccum.model.network import FrameFeatures, Network, build_network
+from lidaraccum.model.network import Network, build_network
 from lidaraccum.training.ablations import PARTS, chained_poses, score_without
 from lidaraccum.training.stages import score_stages
 from lidaraccum.training.window import Batch, make_batch

@@ -166,6 +166,14 @@ def test_who_lets_movers_stand_is_off_by_their_way(batches: list[Batch], mistake
         assert scores.static_epe_m < 1e-4
 
 
+def test_what_is_told_to_go_nowhere_does_not_move_whatever_else_is_said(
+    batches: list[Batch],
+) -> None:
+    for scores in scored(batches, tracks=False):
+        assert scores.motion_recall == pytest.approx(1.0)
+        assert scores.alone_motion_recall == 0.0
+
+
 def test_movers_belong_into_their_boxes_of_the_target_frame(batches: list[Batch]) -> None:
     for batch in batches:
         goal, frames = goal_of(batch), batch.frames

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from lidaraccum.geometry.carried import carried
 from lidaraccum.geometry.clustering import connected_cells, dense_groups
 from lidaraccum.geometry.voxel import voxel_keys
-from lidaraccum.model.answers import FrameFeatures, Perception
+from lidaraccum.model.answers import FrameFeatures, ObjectMotions, Perception
 from lidaraccum.model.batch import FrameTensors, to_arrays, to_indices
 from lidaraccum.model.kabsch import chain, invert, move
 from lidaraccum.model.motion import Windows
 from lidaraccum.model.network import MOST_POINTS, Network
+from lidaraccum.model.tubes import centre_by_time
 
 VOXEL_M = 0.15
 """The paper, section 3.4: points are thinned before they are clustered."""
@@ -25,6 +26,8 @@ RADIUS_M = 0.4
 NEIGHBOURS = 5
 MIN_VOXELS = 15
 """DBSCAN of positions plus offsets, seen from above, and its least cluster; METHOD.md section 4."""
+MOVES_MPS = 0.5
+"""What goes slower is not dynamic; METHOD.md section 9."""
 GAP_M, STRAY_SHARE = 0.4, 0.05
 """What such a gap parts from the rest of an object, and is a smaller share, says nothing of it."""
 
@@ -75,6 +78,8 @@ def answer_alone(
     if chosen.any():
         objects = network.track(seen, torch.where(_speaking(seen, ids), ids, 0))
         own = torch.searchsorted(objects.ids, ids[chosen])
+        if "motion" not in without:
+            moving[chosen] &= ~_stand(objects)[own]
         motion = objects.target_from_aligned[own, seen.frame[chosen]]
         there = move(motion, seen.position[chosen][:, None])[:, 0]
         goes = moving[chosen]
@@ -119,6 +124,18 @@ def _clusters(seen: Perception, chosen: torch.Tensor, after: int) -> torch.Tenso
     positions, offsets = to_arrays(seen.position[chosen]), to_arrays(seen.offset[chosen])
     objects = cluster_by_offsets(positions, offsets)
     return torch.from_numpy(np.where(objects > 0, objects + after, 0))
+
+
+def _stand(objects: ObjectMotions) -> torch.Tensor:
+    """(K,) bool: which objects go slower than what counts as moving, by all they are seen to go."""
+    tubes = objects.tubes
+    seconds = tubes.seconds_by_time().abs()
+    far = seconds.argmax(dim=1)
+    each = torch.arange(len(far), device=far.device)
+    middle = tubes.anchor + centre_by_time(tubes.relative, tubes)[each, far]
+    gone = move(objects.target_from_aligned[each, far], middle[:, None])[:, 0] - middle
+    way = torch.linalg.vector_norm(gone, dim=1)
+    return (seconds[each, far] > 0) & (way < MOVES_MPS * seconds[each, far])
 
 
 def _speaking(seen: Perception, ids: torch.Tensor) -> torch.Tensor:
