@@ -31,9 +31,10 @@ def main() -> None:
     networks = [load_network(path) for path in options.weights]
     mean = load_network(options.tubes) if options.tubes else networks[0]
     count = options.ego_pillars or networks[0].settings.ego_pillars
-    alike = {"ego_pillars": count, "glance_odds": mean.settings.glance_odds}
+    own = mean.settings
+    alike = {"ego_pillars": count, "glance_odds": own.glance_odds, "beside_odds": own.beside_odds}
     if options.tubes:
-        alike["tube"] = mean.settings.tube
+        alike["tube"] = own.tube
     settings = {replace(network.settings, **alike) for network in [mean, *networks]}
     if len(settings) > 1:
         parser.error("the networks differ in their settings")

@@ -9,10 +9,11 @@ import pytest
 import torch
 
 from lidaraccum.data.frame import Frame
+from lidaraccum.model.answers import FrameFeatures
 from lidaraccum.model.batch import prepare, to_tensors
-from lidaraccum.model.looking import FOREGROUND_GATE, close_pillars, points_of
+from lidaraccum.model.looking import BESIDE_M, FOREGROUND_GATE, close_pillars, points_of
 from lidaraccum.model.motion import Windows
-from lidaraccum.model.network import FrameFeatures, Network, build_network
+from lidaraccum.model.network import Network, build_network
 from lidaraccum.model.settings import NetworkSettings
 
 SETTINGS = NetworkSettings(
@@ -22,8 +23,9 @@ SETTINGS = NetworkSettings(
 WINDOW = Windows.single(2)
 
 
-def _network(glance_odds: float) -> Network:
-    return build_network(replace(SETTINGS, glance_odds=glance_odds)).eval()
+def _network(glance_odds: float, beside_odds: float = 1.0) -> Network:
+    asked = replace(SETTINGS, glance_odds=glance_odds, beside_odds=beside_odds)
+    return build_network(asked).eval()
 
 
 @pytest.fixture(scope="module")
@@ -66,3 +68,32 @@ def test_a_doubtful_pillar_is_looked_at_if_its_middle_point_passes(features: Fra
     glanced = expected & (features.foreground == -2.0)
     assert 0 < glanced.sum() < (features.foreground == -2.0).sum()
     assert torch.equal(_chosen(network, features), points_of(features.frames, expected))
+
+
+def test_beside_what_moves_its_own_parts_are_looked_for(features: FrameFeatures) -> None:
+    network = _network(1.0, 0.01)
+    frames = features.frames
+    everything, poses = torch.arange(len(frames.points)), torch.eye(4).repeat(2, 1, 1)
+    count = torch.bincount(frames.pillar)
+    middle = count.cumsum(0) - count + count // 2
+    with torch.no_grad():
+        network.point_head.foreground.bias += 10.0
+        for one in range(len(middle) // 2, len(middle)):
+            alone = torch.full_like(features.foreground, -2.0)
+            alone[one] = 0.0  # one pillar passes the gate, all others are doubtful
+            features = replace(features, foreground=alone)
+            said = network.perceive(features, poses, WINDOW, everything).dynamic[middle]
+            if said[one] > said.median() + 0.01:
+                break
+        network.point_head.dynamic.bias -= said.median()  # half of all pillars move
+    moves = said > said.median() + 1e-4
+    centres = frames.pillar_centres()
+    away = (centres - centres[one]).abs().amax(dim=1)
+    near = (away < BESIDE_M + 0.01) & (frames.pillar_frame == frames.pillar_frame[one])
+    expected = near & moves
+    assert 10 < expected.sum() < near.sum() < len(near) / 4
+    assert torch.equal(_chosen(network, features), points_of(frames, expected))
+    with torch.no_grad():
+        network.point_head.dynamic.bias -= 10.0  # it does not move after all
+    alone_passes = points_of(frames, close_pillars(alone))
+    assert torch.equal(_chosen(network, features), alone_passes)

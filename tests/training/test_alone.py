@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
+import torch
 
-from lidaraccum.training.alone import hang_together
+from lidaraccum.model.answers import ObjectMotions
+from lidaraccum.model.tubes import gather_tubes
+from lidaraccum.training.alone import go_along, hang_together, stand
 
 
 def _car(along: float) -> np.ndarray:
@@ -31,3 +35,37 @@ def test_an_object_of_a_few_points_apart_from_each_other_speaks_all_the_same() -
     objects, frame = np.array([1, 1, 0]), np.array([0, 0, 0])
     assert hang_together(few, objects, frame).tolist() == [True, True, False]
     assert hang_together(few[:0], objects[:0], frame[:0]).shape == (0,)
+
+
+def _objects(middle: torch.Tensor, velocity: torch.Tensor) -> tuple[ObjectMotions, torch.Tensor]:
+    """One, seen four times, a tenth of a second apart, about (T, 3) places; its points."""
+    lot = torch.rand(4, 200, 3, generator=torch.Generator().manual_seed(0)) - 0.5
+    points = (middle[:, None] + lot * torch.tensor([4.0, 1.5, 1.5])).flatten(0, 1)
+    time = torch.arange(4).repeat_interleave(200)
+    zero = torch.zeros(800, dtype=torch.int64)
+    tubes = gather_tubes(points, zero, time, 0.1 * time, zero[:1], 1)
+    motion = torch.eye(4).repeat(1, 4, 1, 1)
+    motion[0, :, :3, 3] = -0.1 * torch.arange(4)[:, None] * velocity
+    ids = torch.ones(1, dtype=torch.int64)
+    return ObjectMotions(ids, zero[:1], zero, time, tubes, None, motion), points
+
+
+@pytest.mark.parametrize(("speed", "stands"), [(0.0, True), (0.4, True), (0.6, False)])
+def test_what_is_said_to_creep_stands(speed: float, stands: bool) -> None:
+    velocity = torch.tensor([0.6, 0.8, 0.0]) * speed
+    there = torch.tensor([8.0, 2.0, 0.0]) + 0.1 * torch.arange(4)[:, None] * velocity
+    assert stand(_objects(there, velocity)[0]).tolist() == [stands]
+
+
+@pytest.mark.parametrize(
+    ("aside", "own", "other", "along"),
+    [(0.0, 9.0, 9.0, True), (3.0, 9.0, 9.0, False), (0.0, 9.0, 5.0, False), (0.0, 0.0, 0.0, False)],
+)
+def test_spray_about_the_sensor_goes_along_and_a_car_beside_does_not(
+    aside: float, own: float, other: float, along: bool
+) -> None:
+    ahead = torch.tensor([1.0, 0.0, 0.0])
+    sensors = 0.1 * own * torch.arange(4)[:, None] * ahead
+    middle = sensors + torch.tensor([0.5, aside, 0.0])
+    objects, points = _objects(middle, other * ahead)
+    assert go_along(objects, points, sensors).tolist() == [along]

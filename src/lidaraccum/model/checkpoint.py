@@ -20,7 +20,7 @@ from lidaraccum.model.unet import channels_last
 FORMAT = "lidaraccum-network-1"
 _SETTINGS = "settings"
 _METADATA = "lidaraccum"
-_UNSAID = {"pillar_points": 0, "tube": "centroid", "glance_odds": 1.0}
+_UNSAID = {"pillar_points": 0, "tube": "centroid", "glance_odds": 1.0, "beside_odds": 1.0}
 """How a network was made whose file does not say so: it is older than the setting."""
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
+from torch import nn
 
 from lidaraccum.model.batch import FrameTensors
 from lidaraccum.model.kabsch import move
@@ -15,6 +16,8 @@ from lidaraccum.model.motion import PointHead, Windows, read
 FOREGROUND_GATE = -1.0
 """Points are looked at closely when their pillar's foreground logit is above this (0.27): the
 second look takes back what is not."""
+BESIDE_M = 2.0
+"""So far from what moves its own parts are looked for."""
 
 
 def close_pillars(foreground: torch.Tensor) -> torch.Tensor:
@@ -107,19 +110,50 @@ class View:
         own = read(base, xy, half)
         return (*head(read(motion_map, aligned_xy, half), own, place), own)
 
-    def choose(self, head: PointHead, foreground: torch.Tensor, least_odds: float) -> torch.Tensor:
+    def choose(
+        self, head: PointHead, foreground: torch.Tensor, glance_odds: float, beside_odds: float
+    ) -> torch.Tensor:
         """The points (Q,) int64, ascending, worth a closer look, by their pillars' logits (V,).
 
-        Those of pillars that pass the gate; and of doubtful ones whose middle point does.
+        Those of pillars that pass the gate; of doubtful ones whose middle point does; and of such,
+        within `BESIDE_M` of what moves, whose middle point moves: an object that is found is found
+        whole.
         """
-        frames = self.frames
         passed = close_pillars(foreground)
-        doubtful = torch.nonzero(doubtful_pillars(foreground, least_odds))[:, 0]
-        count = torch.bincount(frames.pillar, minlength=len(foreground))
-        middle = (count.cumsum(0) - count + count // 2)[doubtful]
-        _, glanced, *_ = self.ask(head, middle, *self.place(middle))
+        doubtful = torch.nonzero(doubtful_pillars(foreground, glance_odds))[:, 0]
+        glanced, _ = self._glance(head, doubtful)
         passed[doubtful] = close_pillars(glanced)
-        return points_of(frames, passed)
+        doubtful = doubtful_pillars(foreground, beside_odds) & ~passed
+        if doubtful.any():
+            asked = torch.nonzero(passed)[:, 0]
+            doubtful &= self._beside(asked[_moves(*self._glance(head, asked))])
+            beside = torch.nonzero(doubtful)[:, 0]
+            passed[beside] = _moves(*self._glance(head, beside))
+        return points_of(self.frames, passed)
+
+    def _glance(self, head: PointHead, pillars: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Foreground and dynamic logits of the middle points of pillars (K,) int64."""
+        frames = self.frames
+        count = torch.bincount(frames.pillar, minlength=len(frames.pillar_cell))
+        middle = (count.cumsum(0) - count + count // 2)[pillars]
+        _, foreground, dynamic, *_ = self.ask(head, middle, *self.place(middle))
+        return foreground, dynamic
+
+    def _beside(self, pillars: torch.Tensor) -> torch.Tensor:
+        """(V,) bool: pillars within `BESIDE_M`, in x and in y, of some (K,) of their own frame."""
+        frames = self.frames
+        size = frames.cells
+        near = torch.zeros(len(frames) * size * size, device=pillars.device)
+        near[frames.pillar_place[pillars]] = 1.0
+        reach = math.ceil(BESIDE_M / frames.pillar_m)
+        near = near.view(-1, 1, size, size)
+        for window, pad in (((2 * reach + 1, 1), (reach, 0)), ((1, 2 * reach + 1), (0, reach))):
+            near = nn.functional.max_pool2d(near, window, stride=1, padding=pad)
+        return near.view(-1)[frames.pillar_place] > 0.0
+
+
+def _moves(foreground: torch.Tensor, dynamic: torch.Tensor) -> torch.Tensor:
+    return (foreground > 0.0) & (dynamic > 0.0)
 
 
 def speakers_of(pillar: torch.Tensor, every: int) -> tuple[torch.Tensor, torch.Tensor]:

@@ -183,7 +183,8 @@ class Network(nn.Module):
 
     def choose(self, view: View, features: FrameFeatures) -> torch.Tensor:
         """The points (Q,) int64, ascending, that are worth a closer look."""
-        return view.choose(self.point_head, features.foreground, self.settings.glance_odds)
+        odds = self.settings.glance_odds, self.settings.beside_odds
+        return view.choose(self.point_head, features.foreground, *odds)
 
     def look(self, view: View, points: torch.Tensor, most: int = 0) -> Perception:
         """The cheap half of `perceive`: what is said of points (Q,) int64, ascending."""

@@ -9,7 +9,10 @@ from lidaraccum.errors import SettingsError
 COARSEST_CELLS = 16
 """Grid sides are multiples of this, so that every level of both U-Nets halves evenly."""
 
-EFFORT = ("extent_m", "pillar_points", "ego_pillars", "ground_pillars", "finer_m", "glance_odds")
+EFFORT = (
+    "extent_m", "pillar_points", "ego_pillars", "ground_pillars", "finer_m", "glance_odds",
+    "beside_odds",
+)  # fmt: skip
 """Settings that say how much is looked at. Weights fit any, best those they learned with."""
 
 TUBES = ("centroid", "edges", "sides", "overlap")
@@ -47,6 +50,8 @@ class NetworkSettings:
             ``rematch_m`` has learned to.
         glance_odds: Of pillars that seem background in their own frame, one point is looked at in
             the whole window, where the odds that they are not are no less than this.
+        beside_odds: The same of pillars within 2 m of what moves in their frame, which are looked
+            at if that point moves.
         temporal_channels: Channels of the temporal block, at half the grid's resolution.
         temporal_blocks: How many of them.
         temporal: How a window's frames are put together: ``max``, the largest of what they say, or
@@ -79,6 +84,7 @@ class NetworkSettings:
     rematch_m: tuple[float, ...] = (3.0, 1.5, 0.7)
     finer_m: tuple[float, ...] = (0.7, 0.4, 0.4, 0.4)
     glance_odds: float = 0.1
+    beside_odds: float = 0.01
     temporal_channels: int = 48
     temporal_blocks: int = 2
     temporal: str = "max"
@@ -99,8 +105,8 @@ class NetworkSettings:
             raise SettingsError(f"temporal is max or decay, not {self.temporal!r}")
         if self.tube not in TUBES:
             raise SettingsError(f"tube is one of {', '.join(TUBES)}, not {self.tube!r}")
-        if min(self.standing_odds, self.glance_odds) <= 0.0:
-            raise SettingsError("standing_odds and glance_odds are more than 0")
+        if min(self.standing_odds, self.glance_odds, self.beside_odds) <= 0.0:
+            raise SettingsError("standing_odds, glance_odds and beside_odds are more than 0")
         if self.lowest_m >= self.highest_m:
             raise SettingsError("lowest_m must be below highest_m")
         self.cells(self.extent_m)

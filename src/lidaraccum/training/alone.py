@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from lidaraccum.geometry.carried import carried
+from lidaraccum.geometry.carried import TRAVELLED_M, carried
 from lidaraccum.geometry.clustering import connected_cells, dense_groups
 from lidaraccum.geometry.voxel import voxel_keys
 from lidaraccum.model.answers import FrameFeatures, ObjectMotions, Perception
@@ -28,6 +28,9 @@ MIN_VOXELS = 15
 """DBSCAN of positions plus offsets, seen from above, and its least cluster; METHOD.md section 4."""
 MOVES_MPS = 0.5
 """What goes slower is not dynamic; METHOD.md section 9."""
+BESIDE_M, BESIDE_SHARE, ALIKE = 2.0, 0.1, 0.1
+"""Of what drives beside a sensor no such share comes so near, seen from above; who goes alike is
+apart from it by no more than such a share of the way."""
 GAP_M, STRAY_SHARE = 0.4, 0.05
 """What such a gap parts from the rest of an object, and is a smaller share, says nothing of it."""
 
@@ -70,16 +73,19 @@ def answer_alone(
     ids = torch.zeros_like(seen.point)
     # A car that passes a parked one points to a place beside it: they are no one object.
     ids[moving] = _clusters(seen, moving, 0).to(ids.device)
-    stands = movable & ~moving
-    ids[stands] = _clusters(seen, stands, int(ids.max()) if len(ids) else 0).to(ids.device)
+    rest = movable & ~moving
+    ids[rest] = _clusters(seen, rest, int(ids.max()) if len(ids) else 0).to(ids.device)
     level = chain(frames.level_from_sensor[target], poses, invert(frames.level_from_sensor))
     placed = move_frames(frames, level)
     chosen = ids > 0
     if chosen.any():
-        objects = network.track(seen, torch.where(_speaking(seen, ids), ids, 0))
+        speaks = chosen & _speaking(seen, ids)
+        objects = network.track(seen, torch.where(speaks, ids, 0))
         own = torch.searchsorted(objects.ids, ids[chosen])
         if "motion" not in without:
-            moving[chosen] &= ~_stand(objects)[own]
+            sensors = move(level, frames.level_from_sensor[:, :3, 3][:, None])[:, 0]
+            stands = stand(objects) | go_along(objects, seen.position[speaks], sensors)
+            moving[chosen] &= ~stands[own]
         motion = objects.target_from_aligned[own, seen.frame[chosen]]
         there = move(motion, seen.position[chosen][:, None])[:, 0]
         goes = moving[chosen]
@@ -126,16 +132,47 @@ def _clusters(seen: Perception, chosen: torch.Tensor, after: int) -> torch.Tenso
     return torch.from_numpy(np.where(objects > 0, objects + after, 0))
 
 
-def _stand(objects: ObjectMotions) -> torch.Tensor:
+def stand(objects: ObjectMotions) -> torch.Tensor:
     """(K,) bool: which objects go slower than what counts as moving, by all they are seen to go."""
+    far, seconds = _furthest(objects)
+    way = torch.linalg.vector_norm(_gone(objects, far), dim=1)
+    return (seconds > 0) & (way < MOVES_MPS * seconds)
+
+
+def go_along(objects: ObjectMotions, position: torch.Tensor, sensors: torch.Tensor) -> torch.Tensor:
+    """(K,) bool: which objects go as the sensor goes and begin at it: spray, rain, its carrier.
+
+    Args:
+        objects: K of one window.
+        position: (N, 3) metres, of the points that were named.
+        sensors: (F, 3) where the sensor was in each frame, metres, both ego-aligned.
+    """
+    far, _ = _furthest(objects)
+    travelled = sensors[objects.tubes.anchor_time] - sensors[far]
+    length = torch.linalg.vector_norm(travelled, dim=1)
+    apart = torch.linalg.vector_norm(_gone(objects, far) - travelled, dim=1)
+    alike = (length > TRAVELLED_M) & (apart < ALIKE * length)
+    aside = torch.linalg.vector_norm((position - sensors[objects.time])[:, :2], dim=1)
+    near, count = (
+        torch.bincount(objects.instance[some], minlength=len(far))
+        for some in (aside < BESIDE_M, aside >= 0.0)
+    )
+    return alike & (near >= BESIDE_SHARE * count)
+
+
+def _furthest(objects: ObjectMotions) -> tuple[torch.Tensor, torch.Tensor]:
+    """(K,) int64 the time furthest from the anchor's at which each is seen, (K,) seconds apart."""
+    seconds, far = objects.tubes.seconds_by_time().abs().max(dim=1)
+    return far, seconds
+
+
+def _gone(objects: ObjectMotions, far: torch.Tensor) -> torch.Tensor:
+    """(K, 3) metres that objects' middles go from a time (K,) to the anchor's."""
     tubes = objects.tubes
-    seconds = tubes.seconds_by_time().abs()
-    far = seconds.argmax(dim=1)
     each = torch.arange(len(far), device=far.device)
     middle = tubes.anchor + centre_by_time(tubes.relative, tubes)[each, far]
-    gone = move(objects.target_from_aligned[each, far], middle[:, None])[:, 0] - middle
-    way = torch.linalg.vector_norm(gone, dim=1)
-    return (seconds[each, far] > 0) & (way < MOVES_MPS * seconds[each, far])
+    there = move(objects.target_from_aligned[each, far], middle[:, None])[:, 0]
+    return there - middle
 
 
 def _speaking(seen: Perception, ids: torch.Tensor) -> torch.Tensor:
