@@ -32,6 +32,11 @@ ABUTS_M = 0.4
 ACROSS_M = 0.3
 """What reaches so far to both sides of the sensor's way lies across it."""
 
+FAST_MPS = 10.0
+IN_WAY_M, IN_WAY, ALIKE = 1.0, 0.3, 0.1
+"""Where the sensor goes faster, no such share of what drives lies so near to its way right behind
+or before it: what goes alike there, but for such a share, is spray, or rain about the sensor."""
+
 
 def is_carrier(one: WindowObject, frames: Sequence[SightedFrame], settings: MotionSettings) -> bool:
     """Whether a mover is what carries the sensor: all around it, or its bonnet or tail."""
@@ -42,11 +47,20 @@ def is_carrier(one: WindowObject, frames: Sequence[SightedFrame], settings: Moti
     sensors = [rigid.transform(frame.world_from_sensor, frame.viewpoint[None]) for frame in shown]
     carried = (sensors[-1] - sensors[0])[0] / seconds
     apart = float(np.linalg.norm(one.velocity - carried))
-    if np.linalg.norm(carried) < LEAST_SPEED_MPS or apart > ALIKE_MPS:
+    speed = float(np.linalg.norm(carried))
+    if speed < LEAST_SPEED_MPS or apart > max(ALIKE_MPS, ALIKE * speed):
         return False
     away = [frame.world(one.of(frame)) - own for frame, own in zip(shown, sensors, strict=True)]
     around = sum(len(places) * (1 if surrounds(places) else -1) for places in away)
-    return around > 0 or (apart < SAME_MPS and _lies_across(away, carried, settings.min_range_m))
+    if around > 0 and apart < ALIKE_MPS:
+        return True
+    if not _abuts(away, settings.min_range_m):
+        return False
+    aside = _aside(away, carried)
+    if speed > FAST_MPS and np.mean(np.abs(aside) < IN_WAY_M) > IN_WAY:
+        return True
+    low, high = np.quantile(aside, (0.05, 0.95))
+    return bool(apart < SAME_MPS and low < -ACROSS_M and high > ACROSS_M)
 
 
 def surrounds(places: NDArray[np.float64]) -> bool:
@@ -62,11 +76,16 @@ def surrounds(places: NDArray[np.float64]) -> bool:
     return bool(gaps.max(initial=0) < BEARINGS // 2)
 
 
-def _lies_across(
-    away: Sequence[NDArray[np.float64]], carried: NDArray[np.float64], cut_m: float
-) -> bool:
-    """Whether places (N, 3) about the sensor, by frame, lie across its way from the cut on."""
+def _abuts(away: Sequence[NDArray[np.float64]], cut_m: float) -> bool:
+    """Whether places (N, 3) about the sensor, by frame, begin at the cut about it."""
     nearest = np.median([np.linalg.norm(places, axis=1).min() for places in away])
+    return bool(nearest < cut_m + ABUTS_M)
+
+
+def _aside(
+    away: Sequence[NDArray[np.float64]], carried: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(M,) metres to the left of the sensor's way, of places (N, 3) about it, by frame."""
     left = np.array([-carried[1], carried[0]]) / np.linalg.norm(carried[:2])
-    low, high = np.quantile(np.concatenate(away)[:, :2] @ left, (0.05, 0.95))
-    return bool(nearest < cut_m + ABUTS_M and low < -ACROSS_M and high > ACROSS_M)
+    aside: NDArray[np.float64] = np.concatenate(away)[:, :2] @ left
+    return aside
