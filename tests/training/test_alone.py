@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
 from lidaraccum.model.answers import ObjectMotions
 from lidaraccum.model.tubes import gather_tubes
-from lidaraccum.training.alone import go_along, hang_together, stand
+from lidaraccum.training.alone import go_along, hang_together, stand, tower
 
 
 def _car(along: float) -> np.ndarray:
@@ -37,10 +39,12 @@ def test_an_object_of_a_few_points_apart_from_each_other_speaks_all_the_same() -
     assert hang_together(few[:0], objects[:0], frame[:0]).shape == (0,)
 
 
-def _objects(middle: torch.Tensor, velocity: torch.Tensor) -> tuple[ObjectMotions, torch.Tensor]:
+def _objects(
+    middle: torch.Tensor, velocity: torch.Tensor, height: float = 1.5
+) -> tuple[ObjectMotions, torch.Tensor]:
     """One, seen four times, a tenth of a second apart, about (T, 3) places; its points."""
     lot = torch.rand(4, 200, 3, generator=torch.Generator().manual_seed(0)) - 0.5
-    points = (middle[:, None] + lot * torch.tensor([4.0, 1.5, 1.5])).flatten(0, 1)
+    points = (middle[:, None] + lot * torch.tensor([4.0, 1.5, height])).flatten(0, 1)
     time = torch.arange(4).repeat_interleave(200)
     zero = torch.zeros(800, dtype=torch.int64)
     tubes = gather_tubes(points, zero, time, 0.1 * time, zero[:1], 1)
@@ -69,3 +73,15 @@ def test_spray_about_the_sensor_goes_along_and_a_car_beside_does_not(
     middle = sensors + torch.tensor([0.5, aside, 0.0])
     objects, points = _objects(middle, other * ahead)
     assert go_along(objects, points, sensors).tolist() == [along]
+
+
+@pytest.mark.parametrize(("height", "tall"), [(1.5, False), (4.2, False), (6.0, True)])
+def test_a_wall_is_taller_than_what_drives(height: float, tall: bool) -> None:
+    places = torch.tensor([20.0, 3.0, 0.0]).expand(4, 3)
+    objects, points = _objects(places, torch.zeros(3), height)
+    assert tower(objects).tolist() == [tall]
+    points[::100, 2] += 9.0  # rain above it
+    high = gather_tubes(
+        points, objects.instance, objects.time, 0.1 * objects.time, objects.window, 1
+    )
+    assert tower(replace(objects, tubes=high)).tolist() == [tall]

@@ -31,6 +31,8 @@ MOVES_MPS = 0.5
 BESIDE_M, BESIDE_SHARE, ALIKE = 2.0, 0.1, 0.1
 """Of what drives beside a sensor no such share comes so near, seen from above; who goes alike is
 apart from it by no more than such a share of the way."""
+TALLEST_M = 4.6
+"""A double-decker."""
 GAP_M, STRAY_SHARE = 0.4, 0.05
 """What such a gap parts from the rest of an object, and is a smaller share, says nothing of it."""
 
@@ -85,7 +87,7 @@ def answer_alone(
         if "motion" not in without:
             sensors = move(level, frames.level_from_sensor[:, :3, 3][:, None])[:, 0]
             stands = stand(objects) | go_along(objects, seen.position[speaks], sensors)
-            moving[chosen] &= ~stands[own]
+            moving[chosen] &= ~(stands | tower(objects))[own]
         motion = objects.target_from_aligned[own, seen.frame[chosen]]
         there = move(motion, seen.position[chosen][:, None])[:, 0]
         goes = moving[chosen]
@@ -158,6 +160,19 @@ def go_along(objects: ObjectMotions, position: torch.Tensor, sensors: torch.Tens
         for some in (aside < BESIDE_M, aside >= 0.0)
     )
     return alike & (near >= BESIDE_SHARE * count)
+
+
+def tower(objects: ObjectMotions) -> torch.Tensor:
+    """(K,) bool: which objects are taller than anything that drives, but for strays."""
+    tubes = objects.tubes
+    counts = tubes.counts.sum(dim=1)
+    upward = torch.argsort(tubes.relative[:, 2])
+    upward = upward[torch.argsort(tubes.instance[upward], stable=True)]
+    height = tubes.relative[upward, 2]  # by object
+    first = counts.cumsum(0) - counts
+    strays = (STRAY_SHARE * counts / 2).floor().long()
+    rise = height[first + counts - 1 - strays] - height[first + strays]
+    return rise > TALLEST_M
 
 
 def _furthest(objects: ObjectMotions) -> tuple[torch.Tensor, torch.Tensor]:
