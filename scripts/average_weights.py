@@ -27,12 +27,17 @@ def main() -> None:
     parser.add_argument("-o", "--output", required=True, type=Path)
     parser.add_argument("--ego-pillars", type=int, help="background pillars matched in a frame")
     parser.add_argument("--tubes", type=Path, help="weights whose TubeNet the mean is to have")
+    parser.add_argument("--glance-odds", type=float, help="how unlikely pillars are glanced at")
     options = parser.parse_args()
     networks = [load_network(path) for path in options.weights]
     mean = load_network(options.tubes) if options.tubes else networks[0]
     count = options.ego_pillars or networks[0].settings.ego_pillars
     own = mean.settings
-    alike = {"ego_pillars": count, "glance_odds": own.glance_odds, "beside_odds": own.beside_odds}
+    alike = {
+        "ego_pillars": count,
+        "glance_odds": options.glance_odds or own.glance_odds,
+        "beside_odds": own.beside_odds,
+    }
     if options.tubes:
         alike["tube"] = own.tube
     settings = {replace(network.settings, **alike) for network in [mean, *networks]}
