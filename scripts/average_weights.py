@@ -1,6 +1,7 @@
 """Averages the weights of runs that began from the same weights: better than each, at no cost.
 
-Usage: average_weights.py WEIGHTS WEIGHTS... -o OUT [--ego-pillars N] [--tubes WEIGHTS]
+Usage: average_weights.py WEIGHTS WEIGHTS... -o OUT [--ego-pillars N] [--glance-odds P]
+                          [--tubes WEIGHTS]
 
 Source: Wortsman et al., "Model soups" (ICML 2022). The runs may differ in seed and recipe, the
 networks only in how many pillars they match and which they glance at: the mean as the first, or as
