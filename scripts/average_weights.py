@@ -1,7 +1,7 @@
 """Averages the weights of runs that began from the same weights: better than each, at no cost.
 
 Usage: average_weights.py WEIGHTS WEIGHTS... -o OUT [--ego-pillars N] [--glance-odds P]
-                          [--tubes WEIGHTS]
+                          [--beside-odds P] [--tubes WEIGHTS] [--tube KIND]
 
 Source: Wortsman et al., "Model soups" (ICML 2022). The runs may differ in seed and recipe, the
 networks only in how many pillars they match and which they glance at: the mean as the first, or as
@@ -18,6 +18,8 @@ from pathlib import Path
 import torch
 
 from lidaraccum.model.checkpoint import load_network, save_network
+from lidaraccum.model.deepen import deepened
+from lidaraccum.model.settings import TUBES
 from lidaraccum.model.weights import weights_hash
 
 
@@ -29,6 +31,8 @@ def main() -> None:
     parser.add_argument("--ego-pillars", type=int, help="background pillars matched in a frame")
     parser.add_argument("--tubes", type=Path, help="weights whose TubeNet the mean is to have")
     parser.add_argument("--glance-odds", type=float, help="how unlikely pillars are glanced at")
+    parser.add_argument("--beside-odds", type=float, help="the same, beside what moves")
+    parser.add_argument("--tube", choices=TUBES, help="the kind of TubeNet to go on as")
     options = parser.parse_args()
     networks = [load_network(path) for path in options.weights]
     mean = load_network(options.tubes) if options.tubes else networks[0]
@@ -37,7 +41,7 @@ def main() -> None:
     alike = {
         "ego_pillars": count,
         "glance_odds": options.glance_odds or own.glance_odds,
-        "beside_odds": own.beside_odds,
+        "beside_odds": options.beside_odds or own.beside_odds,
     }
     if options.tubes:
         alike["tube"] = own.tube
@@ -53,6 +57,8 @@ def main() -> None:
     notes = {"mean_of": ", ".join(weights_hash(path)[:12] for path in options.weights)}
     if options.tubes:
         notes["tubes_of"] = weights_hash(options.tubes)[:12]
+    if options.tube:
+        mean = deepened(mean, replace(mean.settings, tube=options.tube))
     save_network(mean, options.output, notes)
 
 

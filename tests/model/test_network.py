@@ -241,3 +241,11 @@ def test_what_stands_is_matched_the_rather_the_higher_its_odds(
         assert ego.valid.all()
         shares.append(float((ego.position[..., 2] > 0.3).float().mean()))
     assert shares[0] < shares[1] < shares[2]
+
+
+def test_where_nobody_is_named_there_are_no_objects(network: Network, frames: list[Frame]) -> None:
+    features = encode(network, frames[:3], 16.0)
+    with torch.no_grad():
+        seen = network.perceive(features, still(3), Windows.single(3))
+        objects = network.track(seen, torch.zeros_like(seen.point))
+    assert len(objects.ids) == len(objects.target_from_aligned) == 0

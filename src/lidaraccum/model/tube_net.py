@@ -94,6 +94,9 @@ class TubeNet(nn.Module):
 
     def forward(self, tubes: Tubes, motion: torch.Tensor, base: torch.Tensor) -> TubeMotions:
         """Motions of K objects, from features (Q, D) and (Q, C) of their points."""
+        if len(tubes.anchor) == 0:
+            none = tubes.relative.new_zeros(*tubes.counts.shape, 4, 4)
+            return TubeMotions((none[..., 0],), (none[..., :3, 0],), (none,))
         with exactly(tubes.relative):
             return self._iterate(tubes, motion.float(), base.float())
 
@@ -134,8 +137,7 @@ class TubeNet(nn.Module):
         else:
             gone = centre_by_time(moved, tubes) - centre_by_time(tubes.relative, tubes)
         place = self.place(torch.cat([moved / LENGTH_M, tubes.seconds[:, None]], dim=1))
-        summary = tallest(torch.relu(place), tubes.slot(), count * span)
-        summary = summary.view(count, span, place.shape[1])
+        summary = tallest(torch.relu(place), tubes.slot(), count * span).view(count, span, -1)
         gap = centroid_gap(moved, tubes)
         ahead = torch.arange(span, device=moved.device)[None] - tubes.anchor_time[:, None]
         known = [
