@@ -88,7 +88,7 @@ class Overlap(nn.Module):
         seconds = tubes.seconds_by_time()
         axes = _axes((gone * seconds[..., None]).sum(dim=1))
         share = seconds / seconds.abs().amax(dim=1, keepdim=True).clamp_min(1e-3)
-        share = torch.where(tubes.counts > 0, share, 0.0)
+        share = torch.where(tubes.fixed(), 0.0, share)
         length = torch.linalg.vector_norm(gone, dim=2).amax(dim=1)
         further = moved.new_zeros(len(gone), 3)
         place = (axes[tubes.instance] @ _about_middle(tubes, moved)[..., None])[..., 0]
