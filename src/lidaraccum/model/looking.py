@@ -119,24 +119,23 @@ class View:
         within `BESIDE_M` of what moves, whose middle point moves: an object that is found is found
         whole.
         """
+        count = torch.bincount(self.frames.pillar, minlength=len(foreground))
+        middle = count.cumsum(0) - count + count // 2
         passed = close_pillars(foreground)
         doubtful = torch.nonzero(doubtful_pillars(foreground, glance_odds))[:, 0]
-        glanced, _ = self._glance(head, doubtful)
+        glanced, _ = self._glance(head, middle[doubtful])
         passed[doubtful] = close_pillars(glanced)
         doubtful = doubtful_pillars(foreground, beside_odds) & ~passed
         if doubtful.any():
             asked = torch.nonzero(passed)[:, 0]
-            doubtful &= self._beside(asked[_moves(*self._glance(head, asked))])
+            doubtful &= self._beside(asked[_moves(*self._glance(head, middle[asked]))])
             beside = torch.nonzero(doubtful)[:, 0]
-            passed[beside] = _moves(*self._glance(head, beside))
+            passed[beside] = _moves(*self._glance(head, middle[beside]))
         return points_of(self.frames, passed)
 
-    def _glance(self, head: PointHead, pillars: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Foreground and dynamic logits of the middle points of pillars (K,) int64."""
-        frames = self.frames
-        count = torch.bincount(frames.pillar, minlength=len(frames.pillar_cell))
-        middle = (count.cumsum(0) - count + count // 2)[pillars]
-        _, foreground, dynamic, *_ = self.ask(head, middle, *self.place(middle))
+    def _glance(self, head: PointHead, points: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Foreground and dynamic logits of points (K,) int64, ascending."""
+        _, foreground, dynamic, *_ = self.ask(head, points, *self.place(points))
         return foreground, dynamic
 
     def _beside(self, pillars: torch.Tensor) -> torch.Tensor:

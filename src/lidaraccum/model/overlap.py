@@ -13,6 +13,7 @@ import torch
 from torch import nn
 
 from lidaraccum.model.tubes import LENGTH_M, Tubes, centre_by_time, some_of_each
+from lidaraccum.model.unet import deciding
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,9 @@ _MOST_POINTS = 256
 _MOST_OBJECTS = 64
 """So many points of a time are looked up, or up to twice as many less one; objects at once."""
 
+_ON = 2.0
+"""What a grid says where there are points; 1 beside them."""
+
 _SHARPNESS = 150.0
 """At first: what agreement counts."""
 _CIRCUMSTANCES = 6
@@ -72,7 +76,8 @@ class Overlap(nn.Module):
 
     def __init__(self, channels: int) -> None:
         super().__init__()
-        self.say = nn.ModuleList(_head(channels) for _ in ROUNDS)
+        told = channels + _CIRCUMSTANCES
+        self.say = nn.ModuleList(deciding(told, 2) for _ in ROUNDS)  # all objects alike at first
 
     def forward(
         self, tubes: Tubes, said: torch.Tensor, moved: torch.Tensor, gone: torch.Tensor
@@ -90,31 +95,23 @@ class Overlap(nn.Module):
         share = seconds / seconds.abs().amax(dim=1, keepdim=True).clamp_min(1e-3)
         share = torch.where(tubes.fixed(), 0.0, share)
         length = torch.linalg.vector_norm(gone, dim=2).amax(dim=1)
+        unit = torch.eye(3, device=moved.device)
         further = moved.new_zeros(len(gone), 3)
+        asked = some_of_each(tubes.slot(), tubes.counts.flatten(), _MOST_POINTS)
         place = (axes[tubes.instance] @ _about_middle(tubes, moved)[..., None])[..., 0]
         for one, say in zip(ROUNDS, self.say, strict=True):
             away = torch.linspace(-one.furthest_m, one.furthest_m, one.steps, device=moved.device)
             with torch.no_grad():
                 so_far = share[tubes.instance, tubes.time, None] * further[tubes.instance]
-                agreement = _agreement(tubes, place + so_far, share, one, away)
-            known = [said.mean(dim=1), *_describe(tubes, agreement, away, length)]
-            sharper, nearer = say(torch.cat(known, dim=1)).exp().unbind(dim=1)
+                agreement = _agreement(tubes, place + so_far, asked, share, one, away)
+            known = torch.cat([said.mean(dim=1), _describe(tubes, agreement, away, length)], dim=1)
+            sharper, nearer = say(known).exp().unbind(dim=1)
             odds = _SHARPNESS * sharper[:, None] * agreement
             odds = odds - 0.5 * nearer[:, None] * (away / one.furthest_m) ** 2
             step = (odds.softmax(dim=1) * away).sum(dim=1)
-            further = further + step[:, None] * further.new_tensor(_UNIT[one.axis])
+            further = further + step[:, None] * unit[one.axis]
         way = (further[:, None] @ axes)[:, 0]
         return share[..., None] * way[:, None]
-
-
-_UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
-
-def _head(channels: int) -> nn.Sequential:
-    last = nn.Linear(32, 2)
-    nn.init.normal_(last.weight, std=1e-3)  # all objects alike at first
-    nn.init.zeros_(last.bias)
-    return nn.Sequential(nn.Linear(channels + _CIRCUMSTANCES, 32), nn.ReLU(inplace=True), last)
 
 
 def _axes(way: torch.Tensor) -> torch.Tensor:
@@ -136,8 +133,8 @@ def _about_middle(tubes: Tubes, moved: torch.Tensor) -> torch.Tensor:
 
 def _describe(
     tubes: Tubes, agreement: torch.Tensor, away: torch.Tensor, length: torch.Tensor
-) -> list[torch.Tensor]:
-    """(K, 1) each: how the best way agrees, and that so far, how far apart; plenty, distance."""
+) -> torch.Tensor:
+    """(K, 6): how the best way agrees, and that so far, how far apart; length, plenty, distance."""
     best, at = agreement.max(dim=1)
     described = [
         best,
@@ -147,17 +144,23 @@ def _describe(
         tubes.plenty().mean(dim=1),
         torch.linalg.vector_norm(tubes.anchor[:, :2], dim=1) / (10.0 * LENGTH_M),
     ]
-    return [one[:, None] for one in described]
+    return torch.stack(described, dim=1)
 
 
 def _agreement(
-    tubes: Tubes, place: torch.Tensor, share: torch.Tensor, one: Round, away: torch.Tensor
+    tubes: Tubes,
+    place: torch.Tensor,
+    asked: torch.Tensor,
+    share: torch.Tensor,
+    one: Round,
+    away: torch.Tensor,
 ) -> torch.Tensor:
     """(K, S) 0..1: share of points that lie on others', were objects to go so much further.
 
     Args:
         tubes: Points of K objects over T times.
         place: (Q, 3) metres along, across, upwards.
+        asked: (R,) int64 which of the points are looked up.
         share: (K, T) of what is tried by which each time is shifted, -1..1.
         one: What is tried.
         away: (S,) metres.
@@ -165,8 +168,7 @@ def _agreement(
     count, slot = len(share), tubes.slot()
     ordered = place[:, one.order]
     cell, on_grid = _cell(ordered, one)
-    row = some_of_each(slot, tubes.counts.flatten(), _MOST_POINTS)
-    row = row[on_grid[row]]
+    row = asked[on_grid[asked]]
     weight = 1.0 / torch.bincount(slot[row], minlength=tubes.counts.numel()).to(place.dtype)
     total, pairs = place.new_zeros(count, len(away)), place.new_zeros(count, 1)
     for first in range(0, count, _MOST_OBJECTS):
@@ -191,10 +193,6 @@ def _cell(ordered: torch.Tensor, one: Round) -> tuple[torch.Tensor, torch.Tensor
     limit = torch.tensor(one.cells, device=ordered.device)
     cell = torch.floor(ordered / size).long() + limit // 2
     return cell, ((cell >= 0) & (cell < limit)).all(dim=1)
-
-
-_ON = 2.0
-"""What a grid says where there are points; 1 beside them."""
 
 
 def _occupied(

@@ -132,10 +132,7 @@ class TubeNet(nn.Module):
         """Quaternion (K, T, 4) and shift (K, T, 3) of this iteration, and what led to them."""
         count, span = tubes.counts.shape
         moved = move_points(total, tubes)
-        if self.sides is None:
-            gone = total[..., :3, 3]
-        else:
-            gone = centre_by_time(moved, tubes) - centre_by_time(tubes.relative, tubes)
+        gone = total[..., :3, 3] if self.sides is None else _gone(moved, tubes)
         place = self.place(torch.cat([moved / LENGTH_M, tubes.seconds[:, None]], dim=1))
         summary = tallest(torch.relu(place), tubes.slot(), count * span).view(count, span, -1)
         gap = centroid_gap(moved, tubes)
@@ -178,9 +175,13 @@ class TubeNet(nn.Module):
     ) -> torch.Tensor:
         """Shifts (K, T, 3) along the ways that objects, moved so far, are on."""
         moved = move_points(total, tubes)
-        gone = centre_by_time(moved, tubes) - centre_by_time(tubes.relative, tubes)
         bend = bend_of(total[..., :3, :3])
-        return bent(overlap(tubes, said, moved, unbent(gone, bend)), bend)
+        return bent(overlap(tubes, said, moved, unbent(_gone(moved, tubes), bend)), bend)
+
+
+def _gone(moved: torch.Tensor, tubes: Tubes) -> torch.Tensor:
+    """(K, T, 3) metres that objects' middles were moved, their points (Q, 3) moved so far."""
+    return centre_by_time(moved, tubes) - centre_by_time(tubes.relative, tubes)
 
 
 def _circumstances(tubes: Tubes, gone: torch.Tensor) -> list[torch.Tensor]:

@@ -12,6 +12,7 @@ import torch
 from torch import nn
 
 from lidaraccum.model.tubes import Tubes, centre_by_time, some_of_each
+from lidaraccum.model.unet import deciding
 
 DIRECTIONS = 90
 """Of half a turn, evenly about, across which points are projected."""
@@ -43,12 +44,7 @@ class SideTurn(nn.Module):
 
     def __init__(self, channels: int) -> None:
         super().__init__()
-        last = nn.Linear(32, 3)
-        nn.init.normal_(last.weight, std=1e-3)  # all objects alike at first
-        nn.init.zeros_(last.bias)
-        self.say = nn.Sequential(
-            nn.Linear(channels + _CIRCUMSTANCES, 32), nn.ReLU(inplace=True), last
-        )
+        self.say = deciding(channels + _CIRCUMSTANCES, 3)  # all objects alike at first
         rates = torch.linspace(-FASTEST_RAD_S, FASTEST_RAD_S, _RATES)
         self.register_buffer("rates", rates, persistent=False)
 

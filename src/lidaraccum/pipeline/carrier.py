@@ -52,7 +52,7 @@ def is_carrier(one: WindowObject, frames: Sequence[SightedFrame], settings: Moti
         return False
     away = [frame.world(one.of(frame)) - own for frame, own in zip(shown, sensors, strict=True)]
     around = sum(len(places) * (1 if surrounds(places) else -1) for places in away)
-    if around > 0 and apart < ALIKE_MPS:
+    if around > 0 and apart <= ALIKE_MPS:
         return True
     if not _abuts(away, settings.min_range_m):
         return False

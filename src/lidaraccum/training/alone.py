@@ -155,10 +155,8 @@ def go_along(objects: ObjectMotions, position: torch.Tensor, sensors: torch.Tens
     apart = torch.linalg.vector_norm(_gone(objects, far) - travelled, dim=1)
     alike = (length > TRAVELLED_M) & (apart < ALIKE * length)
     aside = torch.linalg.vector_norm((position - sensors[objects.time])[:, :2], dim=1)
-    near, count = (
-        torch.bincount(objects.instance[some], minlength=len(far))
-        for some in (aside < BESIDE_M, aside >= 0.0)
-    )
+    count = torch.bincount(objects.instance, minlength=len(far))
+    near = torch.bincount(objects.instance[aside < BESIDE_M], minlength=len(far))
     return alike & (near >= BESIDE_SHARE * count)
 
 
