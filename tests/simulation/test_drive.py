@@ -91,6 +91,20 @@ def test_noise_is_as_large_as_the_sensor_says(distance_to: Distance) -> None:
     assert 0.001 < np.median(off) < 0.04
 
 
+def test_beams_are_off_each_by_its_own_and_by_as_much_as_asked() -> None:
+    one, more = (
+        drive(exact=False, weather="clear", seed=6, zeros=True, beam_bias=factor)
+        for factor in (1.0, 5.0)
+    )
+    first, second = one[1], more[1]
+    told = one.labels(1).annotated & more.labels(1).annotated
+    off = np.linalg.norm(second.points, axis=1) - np.linalg.norm(first.points, axis=1)
+    own = [off[told & (first.ring == beam)] for beam in range(16)]
+    assert max(np.ptp(beam) for beam in own if len(beam)) < 1e-4
+    usual = one.drawn.sensor.beam_bias_m
+    assert 0.3 * usual < np.std([beam.mean() for beam in own if len(beam)]) < 5.0 * usual
+
+
 @pytest.mark.parametrize("rolling", [True, False])
 def test_an_objects_points_lie_on_its_surface_by_its_true_motion(
     rolling: bool, distance_to: Distance

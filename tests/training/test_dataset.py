@@ -146,16 +146,19 @@ def test_what_is_simulated_is_as_the_settings_ask(
     asked: list[DriveSettings], toy: ModuleType
 ) -> None:
     SimulatedDrives(toy.SMALL, toy.WINDOWS).make(1)
-    plain = replace(toy.WINDOWS, green=0.0, furniture=False, rolling_shutter=False, exact=True)
+    changes = {
+        "green": 0.0, "dense": 0.5, "beam_bias": 2.0, "furniture": False,
+        "rolling_shutter": False, "exact": True,
+    }  # fmt: skip
+    plain = replace(toy.WINDOWS, **changes)
     SimulatedDrives(toy.SMALL, plain).make(1)
     usual, asked_for = asked
     assert (usual.green, usual.rolling_shutter, usual.exact) == (1.0, None, False)
     assert usual.furniture
-    assert asked_for == replace(
-        usual, green=0.0, furniture=False, rolling_shutter=False, exact=True
-    )
-    with pytest.raises(SettingsError, match="green"):
-        replace(toy.WINDOWS, green=-1.0)
+    assert asked_for == replace(usual, **changes)
+    for name, value in (("green", -1.0), ("dense", 1.5), ("beam_bias", 0.5)):
+        with pytest.raises(SettingsError, match=name):
+            replace(toy.WINDOWS, **{name: value})
 
 
 @pytest.mark.parametrize(("seed", "drive"), [(190, 0), (0, 10_000_000)])

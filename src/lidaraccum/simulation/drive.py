@@ -51,12 +51,14 @@ class SimulatedSequence:
             child(rng),
             rare=settings.rare,
             green=settings.green,
+            dense=settings.dense,
             furniture=settings.furniture,
         )
         self.ego = self._drive(duration, child(rng))
         self.actors: tuple[Actor, ...] = Traffic(self.world, self.ego, child(rng)).populate()
         self.movables = Movables(self.world.stills, self.actors)
-        self._bias = draw_bias(self.drawn.sensor, child(rng))
+        worse = float(np.random.default_rng([settings.seed, 4]).uniform(1.0, settings.beam_bias))
+        self._bias = worse * draw_bias(self.drawn.sensor, child(rng))
         self._stage = Stage(self.world, self.actors, caster)
         self._start_azimuth = float(child(rng).choice([np.pi, np.pi, 0.0, 0.5 * np.pi]))
         self._own: NDArray[np.float32] = self._see_own_car()

@@ -13,6 +13,7 @@ from lidaraccum.simulation.models import Model
 from lidaraccum.simulation.motion import poses_of
 from lidaraccum.simulation.roads import Network
 from lidaraccum.simulation.terrain import Terrain, attitude, corners_of
+from lidaraccum.simulation.thicket import Thickets
 
 Array = NDArray[np.float64]
 FOOT_M = 1.8
@@ -41,12 +42,16 @@ class Plot:
         network: Roads to keep free.
         terrain: Ground to stand on.
         rng: What is drawn while building comes from here.
+        thickets: Grow some of the plants.
     """
 
-    def __init__(self, network: Network, terrain: Terrain, rng: np.random.Generator) -> None:
+    def __init__(
+        self, network: Network, terrain: Terrain, rng: np.random.Generator, thickets: Thickets
+    ) -> None:
         self.network = network
         self.terrain = terrain
         self.rng = rng
+        self.thickets = thickets
         self.parts: list[Mesh] = []
         self.stills: list[Still] = []
         self._discs = np.zeros((256, 3))
@@ -134,7 +139,8 @@ class Plot:
                 continue
             stretch = line[start:end]
             heights = self.terrain.standing_height(stretch)
-            self.parts.append(maker(np.concatenate([stretch, heights[:, None]], axis=1), self.rng))
+            ground = np.concatenate([stretch, heights[:, None]], axis=1)
+            self.parts.append(self.thickets.line(maker, maker(ground, self.rng), ground))
             self.take(stretch, radius)
 
     def park(self, model: Model, place: Array, yaw: float, *, anywhere: bool = False) -> bool:

@@ -39,6 +39,10 @@ class DriveSettings:
             but cars and people on foot) are so many times as likely as usual where one is drawn.
         green: So many times as much as drawn stands about properties (what grows from the ground,
             lines across, cars near it), up to the most that is ever drawn; nothing at 0.
+        dense: Share of hedges, bushes and low crowns that is closed outside, as most of what is
+            recorded is; the others are leaves about a core.
+        beam_bias: The ranges of a sensor's beams are off by up to so many times as much as its
+            data sheet would have it; drawn.
         furniture: Whether signs, bins, kiosks, containers, statues and the like stand about.
         exact: Without noise, losses, mixed edges or weather; for tests of laws.
     """
@@ -57,6 +61,8 @@ class DriveSettings:
     zeros: bool | None = None
     rare: float = 1.0
     green: float = 1.0
+    dense: float = 0.0
+    beam_bias: float = 1.0
     furniture: bool = True
     exact: bool = False
 
@@ -69,10 +75,14 @@ class DriveSettings:
             raise SettingsError(f"a sensor turns 1 to 50 times a second, not {self.rate_hz}")
         if self.speed_mps is not None and not 0.0 <= self.speed_mps <= 45.0:
             raise SettingsError(f"the ego drives 0 to 45 m/s, not {self.speed_mps}")
-        if self.rare <= 0.0:
-            raise SettingsError(f"rare is a factor above 0, not {self.rare}")
-        if self.green < 0.0:
-            raise SettingsError(f"green is a factor of 0 or more, not {self.green}")
+        for told, fits in (
+            (f"rare is a factor above 0, not {self.rare}", self.rare > 0.0),
+            (f"green is a factor of 0 or more, not {self.green}", self.green >= 0.0),
+            (f"dense is a share, 0 to 1, not {self.dense}", 0.0 <= self.dense <= 1.0),
+            (f"beam_bias is a factor of 1 or more, not {self.beam_bias}", self.beam_bias >= 1.0),
+        ):
+            if not fits:
+                raise SettingsError(told)
         for word, value, known in (
             ("sensor", self.sensor, (*SENSORS, RANDOM_SENSOR)),
             ("scene", self.scene, SCENE_KINDS),

@@ -85,7 +85,7 @@ class Site:
         def take(rng: np.random.Generator) -> Mesh:
             choice = int(rng.integers(VARIANTS))
             if choice >= len(pool):
-                pool.append(maker(rng))
+                pool.append(self.plot.thickets.body(maker, maker(rng)))
                 choice = len(pool) - 1
             stretch = tuple(rng.uniform(0.82, 1.22) * rng.uniform(0.92, 1.08, 3))
             return pool[choice].moved((0.0, 0.0, 0.0), 0.0, stretch)

@@ -38,6 +38,7 @@ class Surface(IntEnum):
     CARGO = 24
     OWN_CAR = 25
     CLUTTER = 26
+    THICKET = 27
 
 
 SURFACE_COUNT = len(Surface)
@@ -58,6 +59,7 @@ PASS_SHARE = _table(
         Surface.MESH_FENCE: 0.72,
         Surface.LEAVES: 0.12,
         Surface.HEDGE: 0.12,
+        Surface.THICKET: 0.03,
     },
 )
 """Share of the pulses that go on through the surface and hit what is behind it."""
@@ -76,6 +78,7 @@ ROUGHNESS_M = _table(
         Surface.GRASS: 0.025,
         Surface.GRAVEL: 0.02,
         Surface.HEDGE: 0.04,
+        Surface.THICKET: 0.04,
         Surface.LEAVES: 0.02,
         Surface.TRUNK: 0.015,
         Surface.CLOTH: 0.01,

@@ -17,6 +17,7 @@ from lidaraccum.simulation.site import Site
 from lidaraccum.simulation.streets import line_road
 from lidaraccum.simulation.suburbs import overgrow
 from lidaraccum.simulation.terrain import Terrain, ground_mesh, kerb_mesh, shape_terrain
+from lidaraccum.simulation.thicket import Thickets
 from lidaraccum.simulation.vegetation import draw_tree
 
 Array = NDArray[np.float64]
@@ -52,6 +53,7 @@ def build_world(
     *,
     rare: float = 1.0,
     green: float = 1.0,
+    dense: float = 0.0,
     furniture: bool = True,
 ) -> World:
     """The world about the ego's way.
@@ -62,12 +64,14 @@ def build_world(
         rng: What is drawn comes from here.
         rare: How many times as likely as usual rare movable kinds are.
         green: How many times as much as usual grows about properties.
+        dense: Share of hedges, bushes and low crowns that is a thicket.
         furniture: Whether things stand about that are neither built, grown nor movable.
     """
-    growing = rng.spawn(1)[0]
+    growing, thickening = rng.spawn(2)
     along = network.ego_start + np.linspace(0, max(reach_m, 1.0), 12)
     terrain = shape_terrain(network, network.ego.at(along)[0], rng)
-    plot, catalogue = Plot(network, terrain, rng), Catalogue(rng, rare)
+    plot = Plot(network, terrain, rng, Thickets(dense, thickening))
+    catalogue = Catalogue(rng, rare)
     build_overhead(plot, network.kind, network.ego_start)
     site = Site(plot, catalogue, furniture=furniture)
     _fill_squares(plot, site)

@@ -182,6 +182,8 @@ def _kind_of_drives(windows: WindowSettings) -> str:
     words = [
         f"rare{windows.rare:g}" if windows.rare != 1.0 else "",
         f"green{windows.green:g}" if windows.green != 1.0 else "",
+        f"dense{windows.dense:g}" if windows.dense else "",
+        f"bias{windows.beam_bias:g}" if windows.beam_bias != 1.0 else "",
         "" if windows.furniture else "bare",
         shutter,
         "exact" if windows.exact else "",

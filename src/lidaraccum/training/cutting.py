@@ -35,6 +35,8 @@ class WindowSettings:
         rare: In every other simulated drive what is movable but no car nor on foot is so many times
             as likely as usual: a lorry that is met once in a hundred windows is not learned.
         green: Simulated gardens have so many times as much growth as is drawn; none at 0.
+        dense: Share of what grows in simulated gardens that is closed outside.
+        beam_bias: Simulated beams' ranges are off by up to so many times as much as usual.
         furniture: Whether signs, bins, kiosks and the like stand about in simulated drives.
         rolling_shutter: Whether simulated sweeps take their time; drawn when None.
         exact: Simulated points without noise, losses, mixed edges or weather.
@@ -50,6 +52,8 @@ class WindowSettings:
     sensors: tuple[str, ...] = ()
     rare: float = 1.0
     green: float = 1.0
+    dense: float = 0.0
+    beam_bias: float = 1.0
     furniture: bool = True
     rolling_shutter: bool | None = None
     exact: bool = False
@@ -64,7 +68,9 @@ class WindowSettings:
             raise SettingsError("a drive has at least as many frames as its longest window")
         if self.windows_per_drive < 1 or self.largest_step < 1:
             raise SettingsError("windows_per_drive and largest_step are at least 1")
-        DriveSettings(rare=self.rare, green=self.green)  # refuses what it cannot be
+        DriveSettings(  # refuses what it cannot be
+            rare=self.rare, green=self.green, dense=self.dense, beam_bias=self.beam_bias
+        )
         for name in self.sensors:
             DriveSettings(sensor=name)  # refuses what no sensor is called
 

@@ -71,6 +71,8 @@ class SimulatedDrives:
             training_settings(number, mine.drive_frames),
             compensated=True,
             green=mine.green,
+            dense=mine.dense,
+            beam_bias=mine.beam_bias,
             furniture=mine.furniture,
             rolling_shutter=mine.rolling_shutter,
             exact=mine.exact,
