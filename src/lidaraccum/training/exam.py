@@ -85,11 +85,19 @@ def examine(
 
 
 def simulated_windows(
-    count: int, extent_m: float, settings: NetworkSettings, *, yaw_deg: float = 0.0
+    count: int,
+    extent_m: float,
+    settings: NetworkSettings,
+    *,
+    yaw_deg: float = 0.0,
+    dense: float = 0.0,
 ) -> Iterator[Batch]:
-    """So many windows of the simulator's test set, on a grid of that side, metres; all turned."""
+    """So many windows of the simulator's test set, on a grid of that side, metres; all turned.
+
+    So many of their hedges, bushes and low crowns are ``dense``; none in the test set itself.
+    """
     for number in held_out_numbers(count) if count else ():
-        drawn = replace(held_out_settings(number), compensated=True)
+        drawn = replace(held_out_settings(number), compensated=True, dense=dense)
         drive = simulate(drawn)
         frames = _turned(drive, range(len(drive)), yaw_deg)
         yield make_batch([make_window(frames, 0, settings, extent_m)])
