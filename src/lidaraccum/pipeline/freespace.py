@@ -32,6 +32,9 @@ OUTLASTS_BY = 2
 LOW_SHARE = 0.4
 """Points above this share of the least height count as partners and join what stands on them."""
 
+FOOT_SHARE = 0.28
+"""Points above this share of it are what something stands on, where anything stands beside them."""
+
 
 class SightedFrame:
     """A frame's obstacles (all but ground, sky and the carrier) and what other frames saw there.
@@ -43,6 +46,7 @@ class SightedFrame:
         view: What its rays passed through.
         rows: (M,) int64: the obstacles' rows among the frame's points.
         low_rows: (L,) int64: rows of points lower than obstacles but above the ground.
+        foot_rows: (F,) int64: the same, down to where the ground itself may be.
         close_rows: (C,) int64: rows of points that stand so close that they may be the carrier.
         near_points: (M + L, 3) float64, metres, sensor coordinates: obstacles, then low points.
         near_heights: (M + L,) metres above the ground.
@@ -77,9 +81,9 @@ class SightedFrame:
         standing = outside & low_enough
         obstacle = heights >= settings.min_height_m
         self.rows = np.flatnonzero(standing & obstacle)
-        self.low_rows = np.flatnonzero(
-            standing & ~obstacle & (heights > LOW_SHARE * settings.min_height_m)
-        )
+        low = standing & ~obstacle
+        self.low_rows = np.flatnonzero(low & (heights > LOW_SHARE * settings.min_height_m))
+        self.foot_rows = np.flatnonzero(low & (heights > FOOT_SHARE * settings.min_height_m))
         self.close_rows = np.flatnonzero(
             ~outside & low_enough & obstacle & (squared > MIN_RANGE_M**2)
         )
@@ -221,11 +225,6 @@ class SightedFrame:
     def close_world(self) -> NDArray[np.float64]:
         """Close points in the world, (C, 3) metres."""
         return rigid.transform(self.world_from_sensor, self.close_points)
-
-    @property
-    def low_points(self) -> NDArray[np.float64]:
-        """(L, 3) the low points, metres, sensor coordinates."""
-        return self.near_points[len(self.rows) :]
 
     def watch(self, other: SightedFrame) -> None:
         """Count what this frame saw at the other frame's obstacles."""

@@ -17,8 +17,8 @@ from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.gathering import without_outlasting, without_strays
 from lidaraccum.pipeline.shape import ObjectShape
 
-LOW_REACH_M = 0.2
-"""Low points this near to a mover's obstacles, seen from above, are its wheels and shoes."""
+FOOT_REACH_M = 0.2
+"""Low points this near to an object's obstacles, seen from above, are its wheels and shoes."""
 
 MOST_MISSED = 1.5
 """A frame that shows less of a mover than its fullest is filled up as if it showed so many times
@@ -58,7 +58,7 @@ class Canvas:
     def paint(self, track: Track, picked: NDArray[np.int64], label: int) -> None:
         """Give obstacles (K,), and what is low beside them, to an object."""
         self._paint_rows(
-            track, np.concatenate([self._frame.rows[picked], self._low_beside(picked)]), label
+            track, np.concatenate([self._frame.rows[picked], self._feet_of(picked)]), label
         )
 
     def _paint_rows(self, track: Track, rows: NDArray[np.int64], label: int) -> None:
@@ -96,17 +96,15 @@ class Canvas:
             poses_at_stamp=True,
         )
 
-    def _low_beside(self, picked: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _feet_of(self, picked: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Rows of the low points beside obstacles (K,)."""
         frame = self._frame
-        if len(frame.low_rows) == 0:
-            return frame.low_rows
-        low, own = frame.low_points[:, :2], frame.points[picked, :2]
-        least, most = own.min(axis=0) - LOW_REACH_M, own.max(axis=0) + LOW_REACH_M
-        inside = (low[:, 0] > least[0]) & (low[:, 0] < most[0])
-        inside &= (low[:, 1] > least[1]) & (low[:, 1] < most[1])
-        beside = np.flatnonzero(inside)
-        distance, _ = cKDTree(own).query(low[beside], distance_upper_bound=LOW_REACH_M)
-        return frame.low_rows[beside[np.isfinite(distance)]]
+        own = frame.points[picked, :2]
+        low = frame.registered.frame.points[frame.foot_rows, :2].astype(np.float64)
+        inside = (low > own.min(axis=0) - FOOT_REACH_M) & (low < own.max(axis=0) + FOOT_REACH_M)
+        beside = np.flatnonzero(inside.all(axis=1))
+        distance, _ = cKDTree(own).query(low[beside], distance_upper_bound=FOOT_REACH_M)
+        return frame.foot_rows[beside[np.isfinite(distance)]]
 
 
 def paint_mover(track: Track, frame: SightedFrame, canvas: Canvas, box_growth: float) -> None:
