@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -29,8 +29,10 @@ from lidaraccum.simulation.surfaces import Surface
 
 Array = NDArray[np.float64]
 Marked = tuple[Frame, NDArray[np.int64]]
+Rough = tuple[Array, Array]
+Row = list[str]
 RECORDED = {"plants": "vegetation", "buildings": "building", "cars": "car", "road": "road"}
-SIMULATED = {
+SIMULATED: Mapping[str, Sequence[int]] = {
     "plants": (Surface.HEDGE, Surface.LEAVES, Surface.THICKET),
     "buildings": (Surface.BUILDING,),
     "cars": (Surface.CAR_PAINT, Surface.CAR_GLASS, Surface.TRIM, Surface.TYRE),
@@ -69,34 +71,45 @@ def simulated(drives: int, dense: float, beam_bias: float) -> Iterator[Marked]:
         yield Frame(frame.points[order], frame.stamp), semantic[order].astype(np.int64)
 
 
-def roughness(frame: Frame, chosen: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Of chosen points: jumps between neighbours along a line, and thickness about a sample."""
+def roughness(frame: Frame, chosen: Sequence[NDArray[np.bool_]]) -> list[Rough]:
+    """Of each choice of points: jumps between neighbours along a line, thickness about a sample."""
     points = frame.points.astype(np.float64)
     ranges = np.maximum(np.linalg.norm(points, axis=1), 1e-6)
     ground, level = level_by_ground(points)
-    fits = chosen & (ranges > REACH_M[0]) & (ranges < REACH_M[1])
-    fits &= ground.height_above(level) < TALLEST_M
-    ways = points / ranges[:, None]
-    turn = np.linalg.norm(np.diff(ways, axis=0), axis=1)
-    beside = fits[1:] & fits[:-1] & (turn < NEIGHBOUR_RAD)
-    kept = points[fits]
-    if len(kept) < FEWEST:
-        return np.zeros(0), np.zeros(0)
-    tree = cKDTree(kept)
-    sample = np.random.default_rng(0).permutation(len(kept))[:SAMPLE]
-    balls = [ball for ball in tree.query_ball_point(kept[sample], BALL_M) if len(ball) >= FEWEST]
-    flat = [np.linalg.eigvalsh(np.cov(kept[ball].T))[0] for ball in balls]
-    return np.abs(np.diff(ranges))[beside], np.sqrt(np.maximum(flat, 0.0))
+    near = (ranges > REACH_M[0]) & (ranges < REACH_M[1])
+    near &= ground.height_above(level) < TALLEST_M
+    turn = np.linalg.norm(np.diff(points / ranges[:, None], axis=0), axis=1)
+    jump = np.abs(np.diff(ranges))
+    found = []
+    for one in chosen:
+        fits = one & near
+        beside = fits[1:] & fits[:-1] & (turn < NEIGHBOUR_RAD)
+        found.append((jump[beside], thickness(points[fits])))
+    return found
 
 
-def row(name: str, frames: Iterator[Marked], classes: tuple[int, ...]) -> list[str]:
-    """A line of the table."""
-    parts = [roughness(frame, np.isin(semantic, classes)) for frame, semantic in frames]
-    jumps = np.concatenate([part[0] for part in parts])
-    thick = np.concatenate([part[1] for part in parts])
-    quantiles = 100 * np.quantile(jumps, [0.25, 0.5, 0.75, 0.95])
-    cells = [f"{value:.1f}" for value in quantiles]
-    return [name, *cells, f"{np.mean(jumps > FAR_M):.2f}", f"{100 * np.median(thick):.1f}"]
+def thickness(points: Array) -> Array:
+    """Smallest sigma, metres, of the points (N, 3) about some of them."""
+    sample = np.random.default_rng(0).permutation(len(points))[:SAMPLE]
+    balls = cKDTree(points).query_ball_point(points[sample], BALL_M)
+    full = [ball for ball in balls if len(ball) >= FEWEST]
+    flat = [np.linalg.eigvalsh(np.cov(points[ball].T))[0] for ball in full]
+    return np.sqrt(np.maximum(flat, 0.0))
+
+
+def rows(word: str, frames: Iterator[Marked], classes: Mapping[str, Sequence[int]]) -> list[Row]:
+    """A line of the table for each kind of surface."""
+    parts = [
+        roughness(frame, [np.isin(semantic, own) for own in classes.values()])
+        for frame, semantic in frames
+    ]
+    made = []
+    for kind, found in zip(classes, zip(*parts, strict=True), strict=True):
+        jumps, thick = (np.concatenate(column) for column in zip(*found, strict=True))
+        cells = [f"{value:.1f}" for value in 100 * np.quantile(jumps, [0.25, 0.5, 0.75, 0.95])]
+        cells += [f"{np.mean(jumps > FAR_M):.2f}", f"{100 * np.median(thick):.1f}"]
+        made.append([f"{kind}, {word}", *cells])
+    return made
 
 
 def main() -> None:
@@ -108,14 +121,15 @@ def main() -> None:
     parser.add_argument("--beam-bias", type=float, default=1.0)
     options = parser.parse_args()
     names = json.loads((options.recording / "meta.json").read_text())["classes"]
-    rows = []
-    for kind, surfaces in SIMULATED.items():
-        classes = (names.index(RECORDED[kind]),)
-        rows.append(row(f"{kind}, recorded", recorded(options.recording), classes))
-        drawn = simulated(options.drives, options.dense, options.beam_bias)
-        rows.append(row(f"{kind}, simulated", drawn, tuple(map(int, surfaces))))
+    classes = {kind: [names.index(name)] for kind, name in RECORDED.items()}
+    drawn = simulated(options.drives, options.dense, options.beam_bias)
+    pairs = zip(
+        rows("recorded", recorded(options.recording), classes),
+        rows("simulated", drawn, SIMULATED),
+        strict=True,
+    )
     titles = ("", "jump 25 %", "50 %", "75 %", "95 %", "> 30 cm", "thickness")
-    print(Table("Roughness, cm", titles, rows).markdown())
+    print(Table("Roughness, cm", titles, [row for pair in pairs for row in pair]).markdown())
 
 
 if __name__ == "__main__":

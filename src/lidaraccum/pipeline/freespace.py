@@ -226,6 +226,11 @@ class SightedFrame:
         """Close points in the world, (C, 3) metres."""
         return rigid.transform(self.world_from_sensor, self.close_points)
 
+    @cached_property
+    def feet(self) -> NDArray[np.float64]:
+        """(F, 3) the points of ``foot_rows``, metres, sensor coordinates."""
+        return _picked(self.registered.frame.points, self.foot_rows)
+
     def watch(self, other: SightedFrame) -> None:
         """Count what this frame saw at the other frame's obstacles."""
         sensor_from_other = self.sensor_from_world @ other.world_from_sensor

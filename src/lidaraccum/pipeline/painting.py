@@ -99,8 +99,7 @@ class Canvas:
     def _feet_of(self, picked: NDArray[np.int64]) -> NDArray[np.int64]:
         """Rows of the low points beside obstacles (K,)."""
         frame = self._frame
-        own = frame.points[picked, :2]
-        low = frame.registered.frame.points[frame.foot_rows, :2].astype(np.float64)
+        low, own = frame.feet[:, :2], frame.points[picked, :2]
         inside = (low > own.min(axis=0) - FOOT_REACH_M) & (low < own.max(axis=0) + FOOT_REACH_M)
         beside = np.flatnonzero(inside.all(axis=1))
         distance, _ = cKDTree(own).query(low[beside], distance_upper_bound=FOOT_REACH_M)

@@ -74,24 +74,38 @@ def low_tree(rng: np.random.Generator) -> Mesh:
     return merge(parts)
 
 
+def blunt(values: Array, power: float) -> Array:
+    """Sines or cosines of a circle (...) drawn towards a square's: powers from 1 down to 0."""
+    return np.sign(values) * np.abs(values) ** power
+
+
+def blunt_ball(rows: int, columns: int, level: float, around: float) -> Array:
+    """Points (R, K, 3) from pole to pole of a body between a unit ball and a cube.
+
+    Args:
+        rows: R.
+        columns: K.
+        level: How blunt its profile is: 1 round, towards 0 square.
+        around: The same seen from above.
+    """
+    polar = np.linspace(-0.5 * np.pi, 0.5 * np.pi, rows)[:, None]
+    angle = 2 * np.pi * np.arange(columns) / columns
+    out = blunt(np.cos(polar), level)
+    return np.stack(
+        [
+            out * blunt(np.cos(angle), around),
+            out * blunt(np.sin(angle), around),
+            np.repeat(blunt(np.sin(polar), level), columns, axis=1),
+        ],
+        axis=2,
+    )
+
+
 def clipped(rng: np.random.Generator) -> Mesh:
     """Box, yew or laurel cut to a block, a cushion or a bonnet, up to the size of a van."""
     size = np.array([rng.uniform(0.7, 5.2), rng.uniform(0.7, 2.0), rng.uniform(0.5, 2.1)])
     leaf, power = _leaf(rng), rng.uniform(0.25, 0.9)
-    polar = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 8)
-    around = 2 * np.pi * np.arange(16) / 16
-
-    def blunt(values: Array) -> Array:
-        return np.sign(values) * np.abs(values) ** power
-
-    unit = np.stack(
-        [
-            blunt(np.cos(polar))[:, None] * blunt(np.cos(around)),
-            blunt(np.cos(polar))[:, None] * blunt(np.sin(around)),
-            np.repeat(blunt(np.sin(polar))[:, None], 16, axis=1),
-        ],
-        axis=2,
-    )
+    unit = blunt_ball(8, 16, power, power)
     rough = 1 + rng.uniform(0.01, 0.08) * rng.standard_normal((8, 16, 1))
     surface = unit * rough * 0.5 * size + np.array([0, 0, 0.5 * size[2]])
     count = int(np.clip(35 * (size[0] + size[1]) * size[2], 60, 600))

@@ -109,6 +109,7 @@ class DrawnDrive:
     compensated: bool
     vehicle_coordinates: bool
     zeros: bool
+    beam_bias: float
     realism: Realism
 
 
@@ -130,9 +131,11 @@ def draw_drive(settings: DriveSettings) -> DrawnDrive:
     zeros = _either(settings.zeros, chance[4] < 0.12)
     weather = settings.weather or _pick(chance[5], ["clear"] * 16 + ["rain", "rain", "fog", "snow"])
     realism = _draw_realism(weather, children[5])
+    worse = np.random.default_rng([settings.seed, 4])
+    beam_bias = float(worse.uniform(1.0, settings.beam_bias))
     return DrawnDrive(
         sensor, rate, scene, speed, manoeuvre, rolling, compensated, vehicle,
-        zeros, IDEAL if settings.exact else realism,
+        zeros, beam_bias, IDEAL if settings.exact else realism,
     )  # fmt: skip
 
 

@@ -28,6 +28,13 @@ def on_line(line: Array, at: Array) -> Array:
     return line[low] * (1 - share) + line[low + 1] * share
 
 
+def leftward(line: Array) -> Array:
+    """Unit vectors (K, 3), level, to the left of a line (K, 3)."""
+    ahead = np.gradient(line[:, :2], axis=0)
+    ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-9)
+    return np.stack([-ahead[:, 1], ahead[:, 0], np.zeros(len(line))], axis=1)
+
+
 def broadleaf(rng: np.random.Generator) -> Mesh:
     """A tree whose crown is several clumps of loose leaves on branches."""
     height = rng.uniform(4.5, 14.0)
@@ -131,9 +138,7 @@ def hedge(line: Array, rng: np.random.Generator) -> Mesh:
     """A hedge along ground points (K, 3), about a metre apart: bumpy core, leaves about it."""
     height, width = rng.uniform(0.6, 3.2), rng.uniform(0.5, 1.8)
     neat, leaf = rng.uniform(0.02, 0.18), _leaf(rng, Surface.HEDGE)
-    ahead = np.gradient(line[:, :2], axis=0)
-    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
-    left = np.stack([-ahead[:, 1], ahead[:, 0], np.zeros(len(line))], axis=1)
+    left = leftward(line)
     outline = np.array(
         [[-0.5, -0.05], [-0.5, 0.5], [-0.45, 0.9], [0, 1.0], [0.45, 0.9], [0.5, 0.5], [0.5, -0.05]]
     )
