@@ -2,6 +2,7 @@
 
 Usage: score_weights.py WEIGHTS [--windows 40] [--extent 64] [--threads 2]
                         [--drive DIR [--classed]] [--lift 0.0] [--turn 0] [--dense 0]
+                        [--beside 0]
 
 Prints two Markdown tables: the whole network beside the paper's figures (its own poses, masks,
 objects and motions; five frames, the first the target, ground included, sweeps compensated), and
@@ -68,6 +69,7 @@ def main() -> None:
     parser.add_argument("--lift", type=float, default=0.0, help="tell heights so much too high, m")
     parser.add_argument("--turn", type=float, default=0.0, help="turn all frames, degrees")
     parser.add_argument("--dense", type=float, default=0.0, help="share of plants closed outside")
+    parser.add_argument("--beside", type=float, default=0.0, help="large things every 20 m")
     options = parser.parse_args()
     torch.set_num_threads(options.threads)
     network = load_network(options.weights)
@@ -75,7 +77,9 @@ def main() -> None:
     batches = (
         recorded_windows(options.drive, *what, classed=options.classed, yaw_deg=options.turn)
         if options.drive
-        else simulated_windows(*what, yaw_deg=options.turn, dense=options.dense)
+        else simulated_windows(
+            *what, yaw_deg=options.turn, dense=options.dense, beside=options.beside
+        )
     )
     batches = (lifted(batch, options.lift) for batch in batches)
     began = time.monotonic()

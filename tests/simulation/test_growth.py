@@ -24,7 +24,7 @@ from lidaraccum.simulation.networks import lay_network
 from lidaraccum.simulation.surfaces import Surface
 from lidaraccum.simulation.thicket import Thickets
 from lidaraccum.simulation.vegetation import bush, hedge
-from lidaraccum.simulation.world import World, build_world
+from lidaraccum.simulation.world import Filling, World, build_world
 
 GREEN = (Surface.HEDGE, Surface.LEAVES)
 
@@ -64,7 +64,7 @@ def test_lines_of_growth_follow_their_ground(maker: Callable[..., Mesh]) -> None
 
 def _world(kind: str, green: float = 1.0) -> World:
     rng = np.random.default_rng(5)
-    return build_world(lay_network(kind, 10.0, rng), 10.0, rng, green=green)
+    return build_world(lay_network(kind, 10.0, rng), 10.0, rng, Filling(green=green))
 
 
 @pytest.mark.parametrize("kind", ["suburban", "crossing"])

@@ -16,7 +16,7 @@ from lidaraccum.simulation.settings import DriveSettings, draw_drive
     [
         {"seed": -1}, {"frames": 0}, {"rate_hz": 0.0}, {"speed_mps": 99.0}, {"sensor": "none"},
         {"scene": "moon"}, {"manoeuvre": "fly"}, {"weather": "hail"}, {"coordinates": "world"},
-        {"dense": -0.1}, {"dense": 1.1}, {"beam_bias": 0.9},
+        {"dense": -0.1}, {"dense": 1.1}, {"beside": -0.1}, {"beam_bias": 0.9},
     ],
     ids=str,
 )  # fmt: skip

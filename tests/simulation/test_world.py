@@ -8,7 +8,7 @@ import pytest
 from lidaraccum.simulation.motion import poses_of
 from lidaraccum.simulation.networks import SCENE_KINDS, lay_network
 from lidaraccum.simulation.surfaces import Surface
-from lidaraccum.simulation.world import build_world
+from lidaraccum.simulation.world import Filling, build_world
 
 
 @pytest.mark.parametrize("kind", SCENE_KINDS)
@@ -36,7 +36,7 @@ def test_without_street_furniture_nothing_of_it_stands_about(kind: str) -> None:
             lay_network(kind, 10.0, np.random.default_rng(5)),
             10.0,
             np.random.default_rng(5),
-            furniture=furniture,
+            Filling(furniture=furniture, beside=6.0),
         )
         for furniture in (True, False)
     )

@@ -147,8 +147,8 @@ def test_what_is_simulated_is_as_the_settings_ask(
 ) -> None:
     SimulatedDrives(toy.SMALL, toy.WINDOWS).make(1)
     changes = {
-        "green": 0.0, "dense": 0.5, "beam_bias": 2.0, "furniture": False,
-        "rolling_shutter": False, "exact": True,
+        "green": 0.0, "dense": 0.5, "beside": 0.7, "beam_bias": 2.0,
+        "furniture": False, "rolling_shutter": False, "exact": True,
     }  # fmt: skip
     plain = replace(toy.WINDOWS, **changes)
     SimulatedDrives(toy.SMALL, plain).make(1)
@@ -156,7 +156,7 @@ def test_what_is_simulated_is_as_the_settings_ask(
     assert (usual.green, usual.rolling_shutter, usual.exact) == (1.0, None, False)
     assert usual.furniture
     assert asked_for == replace(usual, **changes)
-    for name, value in (("green", -1.0), ("dense", 1.5), ("beam_bias", 0.5)):
+    for name, value in (("green", -1.0), ("dense", 1.5), ("beside", -1.0), ("beam_bias", 0.5)):
         with pytest.raises(SettingsError, match=name):
             replace(toy.WINDOWS, **{name: value})
 

@@ -40,8 +40,9 @@ def test_windows_are_spread_over_the_test_set(asked: list[DriveSettings], toy: M
     assert min(places) >= 0
     assert TEST_WINDOWS > max(places) >= min(places) + TEST_WINDOWS // 2
     assert all(settings.compensated and not settings.dense for settings in asked)
-    (_,) = simulated_windows(1, 16.0, toy.SMALL, dense=0.5)
-    assert asked[-1] == replace(asked[0], dense=0.5)
+    assert not any(settings.beside for settings in asked)
+    (_,) = simulated_windows(1, 16.0, toy.SMALL, dense=0.5, beside=2.0)
+    assert asked[-1] == replace(asked[0], dense=0.5, beside=2.0)
 
 
 def test_windows_are_spread_over_a_recording(asked: list[DriveSettings], toy: ModuleType) -> None:

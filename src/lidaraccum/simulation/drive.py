@@ -22,7 +22,7 @@ from lidaraccum.simulation.settings import DriveSettings, child, draw_drive
 from lidaraccum.simulation.surfaces import Surface
 from lidaraccum.simulation.sweep_truth import Sweep
 from lidaraccum.simulation.traffic import Traffic
-from lidaraccum.simulation.world import World, build_world
+from lidaraccum.simulation.world import Filling, World, build_world
 
 __all__ = ["DriveSettings", "SimulatedSequence", "simulate"]
 
@@ -45,15 +45,10 @@ class SimulatedSequence:
         rng = np.random.default_rng([settings.seed, 2])
         reach = (self.drawn.speed_mps + 2.0) * duration
         network = lay_network(self.drawn.scene, reach, child(rng))
-        self.world: World = build_world(
-            network,
-            reach,
-            child(rng),
-            rare=settings.rare,
-            green=settings.green,
-            dense=settings.dense,
-            furniture=settings.furniture,
+        filling = Filling(
+            settings.rare, settings.green, settings.dense, settings.beside, settings.furniture
         )
+        self.world: World = build_world(network, reach, child(rng), filling)
         self.ego = self._drive(duration, child(rng))
         self.actors: tuple[Actor, ...] = Traffic(self.world, self.ego, child(rng)).populate()
         self.movables = Movables(self.world.stills, self.actors)

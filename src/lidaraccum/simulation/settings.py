@@ -41,6 +41,8 @@ class DriveSettings:
             lines across, cars near it), up to the most that is ever drawn; nothing at 0.
         dense: Share of hedges, bushes and low crowns that is closed outside, as most of what is
             recorded is; the others are leaves about a core.
+        beside: So many large things, movable or not, stand within 2.5 m of the ego's body on every
+            20 m of its way, on average, besides what a street has.
         beam_bias: The ranges of a sensor's beams are off by up to so many times as much as its
             data sheet would have it; drawn.
         furniture: Whether signs, bins, kiosks, containers, statues and the like stand about.
@@ -62,6 +64,7 @@ class DriveSettings:
     rare: float = 1.0
     green: float = 1.0
     dense: float = 0.0
+    beside: float = 0.0
     beam_bias: float = 1.0
     furniture: bool = True
     exact: bool = False
@@ -79,6 +82,7 @@ class DriveSettings:
             (f"rare is a factor above 0, not {self.rare}", self.rare > 0.0),
             (f"green is a factor of 0 or more, not {self.green}", self.green >= 0.0),
             (f"dense is a share, 0 to 1, not {self.dense}", 0.0 <= self.dense <= 1.0),
+            (f"beside is a number of 0 or more, not {self.beside}", self.beside >= 0.0),
             (f"beam_bias is a factor of 1 or more, not {self.beam_bias}", self.beam_bias >= 1.0),
         ):
             if not fits:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lidaraccum.simulation.beside import crowd
 from lidaraccum.simulation.catalogue import Catalogue
 from lidaraccum.simulation.furniture import CAR_SIZED, KERB_SIDE
 from lidaraccum.simulation.mesh import Mesh, merge
@@ -21,6 +22,20 @@ from lidaraccum.simulation.thicket import Thickets
 from lidaraccum.simulation.vegetation import draw_tree
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Filling:
+    """What fills a world, as `settings.DriveSettings` has it, where it says what each means."""
+
+    rare: float = 1.0
+    green: float = 1.0
+    dense: float = 0.0
+    beside: float = 0.0
+    furniture: bool = True
+
+
+USUAL = Filling()
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,11 +65,7 @@ def build_world(
     network: Network,
     reach_m: float,
     rng: np.random.Generator,
-    *,
-    rare: float = 1.0,
-    green: float = 1.0,
-    dense: float = 0.0,
-    furniture: bool = True,
+    filling: Filling = USUAL,
 ) -> World:
     """The world about the ego's way.
 
@@ -62,16 +73,14 @@ def build_world(
         network: Its roads.
         reach_m: How far the ego will drive, metres.
         rng: What is drawn comes from here.
-        rare: How many times as likely as usual rare movable kinds are.
-        green: How many times as much as usual grows about properties.
-        dense: Share of hedges, bushes and low crowns that is a thicket.
-        furniture: Whether things stand about that are neither built, grown nor movable.
+        filling: What of which there is more or less than usual.
     """
-    growing, thickening = rng.spawn(2)
+    furniture = filling.furniture
+    growing, thickening, crowding = rng.spawn(3)
     along = network.ego_start + np.linspace(0, max(reach_m, 1.0), 12)
     terrain = shape_terrain(network, network.ego.at(along)[0], rng)
-    plot = Plot(network, terrain, rng, Thickets(dense, thickening))
-    catalogue = Catalogue(rng, rare)
+    plot = Plot(network, terrain, rng, Thickets(filling.dense, thickening))
+    catalogue = Catalogue(rng, filling.rare)
     build_overhead(plot, network.kind, network.ego_start)
     site = Site(plot, catalogue, furniture=furniture)
     _fill_squares(plot, site)
@@ -79,7 +88,11 @@ def build_world(
     lined = [one for road in network.roads for one in line_road(site, road, network.kind)]
     plot.rng = growing
     garden = Site(plot, catalogue.drawing_from(growing), furniture=furniture)
-    overgrow(garden, lined, network.ego.at(along)[0], green)
+    overgrow(garden, lined, network.ego.at(along)[0], filling.green)
+    plot.rng = crowding
+    verge = Site(plot, catalogue.drawing_from(crowding), furniture=furniture)
+    stretch = (network.ego_start, network.ego_start + reach_m)
+    crowd(verge, network.ego, stretch, filling.beside)
     ground = [ground_mesh(terrain, network, rng), kerb_mesh(terrain, network, rng)]
     background = merge([*ground, *plot.parts])
     parked = [still.model.mesh.posed(still.world_from_object) for still in plot.stills]

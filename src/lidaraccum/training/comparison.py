@@ -183,6 +183,7 @@ def _kind_of_drives(windows: WindowSettings) -> str:
         f"rare{windows.rare:g}" if windows.rare != 1.0 else "",
         f"green{windows.green:g}" if windows.green != 1.0 else "",
         f"dense{windows.dense:g}" if windows.dense else "",
+        f"beside{windows.beside:g}" if windows.beside else "",
         f"bias{windows.beam_bias:g}" if windows.beam_bias != 1.0 else "",
         "" if windows.furniture else "bare",
         shutter,

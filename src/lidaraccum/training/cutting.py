@@ -36,6 +36,8 @@ class WindowSettings:
             as likely as usual: a lorry that is met once in a hundred windows is not learned.
         green: Simulated gardens have so many times as much growth as is drawn; none at 0.
         dense: Share of what grows in simulated gardens that is closed outside.
+        beside: So many large things stand right beside each 20 m of simulated egos' ways, besides
+            what streets have.
         beam_bias: Simulated beams' ranges are off by up to so many times as much as usual.
         furniture: Whether signs, bins, kiosks and the like stand about in simulated drives.
         rolling_shutter: Whether simulated sweeps take their time; drawn when None.
@@ -53,6 +55,7 @@ class WindowSettings:
     rare: float = 1.0
     green: float = 1.0
     dense: float = 0.0
+    beside: float = 0.0
     beam_bias: float = 1.0
     furniture: bool = True
     rolling_shutter: bool | None = None
@@ -69,8 +72,9 @@ class WindowSettings:
         if self.windows_per_drive < 1 or self.largest_step < 1:
             raise SettingsError("windows_per_drive and largest_step are at least 1")
         DriveSettings(  # refuses what it cannot be
-            rare=self.rare, green=self.green, dense=self.dense, beam_bias=self.beam_bias
-        )
+            rare=self.rare, green=self.green, dense=self.dense, beside=self.beside,
+            beam_bias=self.beam_bias,
+        )  # fmt: skip
         for name in self.sensors:
             DriveSettings(sensor=name)  # refuses what no sensor is called
 

@@ -72,6 +72,7 @@ class SimulatedDrives:
             compensated=True,
             green=mine.green,
             dense=mine.dense,
+            beside=mine.beside,
             beam_bias=mine.beam_bias,
             furniture=mine.furniture,
             rolling_shutter=mine.rolling_shutter,

@@ -91,13 +91,15 @@ def simulated_windows(
     *,
     yaw_deg: float = 0.0,
     dense: float = 0.0,
+    beside: float = 0.0,
 ) -> Iterator[Batch]:
     """So many windows of the simulator's test set, on a grid of that side, metres; all turned.
 
-    So many of their hedges, bushes and low crowns are ``dense``; none in the test set itself.
+    So many of their hedges, bushes and low crowns are ``dense``, and so many large things stand
+    ``beside`` each 20 m of the way; none in the test set itself.
     """
     for number in held_out_numbers(count) if count else ():
-        drawn = replace(held_out_settings(number), compensated=True, dense=dense)
+        drawn = replace(held_out_settings(number), compensated=True, dense=dense, beside=beside)
         drive = simulate(drawn)
         frames = _turned(drive, range(len(drive)), yaw_deg)
         yield make_batch([make_window(frames, 0, settings, extent_m)])
