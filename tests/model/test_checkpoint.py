@@ -18,7 +18,7 @@ from lidaraccum.model.checkpoint import (
     save_network,
     write_tensors,
 )
-from lidaraccum.model.network import Network, build_network
+from lidaraccum.model.network import Network
 from lidaraccum.model.weights import weights_hash
 
 
@@ -40,16 +40,29 @@ def test_the_network_comes_back_with_its_settings_and_answers(
 def test_a_file_from_before_a_setting_is_read_as_it_was_made(
     network: Network, tmp_path: Path
 ) -> None:
-    """Older networks learned on all points of a pillar, and objects' shifts from centroids."""
-    network = build_network(replace(network.settings, tube="centroid"))
+    """Older networks looked no further beside what moves."""
     path = tmp_path / "weights.safetensors"
     save_network(network, path)
     tensors, metadata = read_tensors(path)
     settings = json.loads(metadata["settings"])
-    del settings["pillar_points"], settings["tube"]
+    del settings["beside_odds"]
     write_tensors(tensors, metadata | {"settings": json.dumps(settings)}, path)
-    assert load_network(path).settings.pillar_points == 0
-    assert load_network(path).settings.tube == "centroid"
+    assert load_network(path).settings.beside_odds == 1.0
+
+
+def test_a_network_of_another_kind_is_told_by_its_file(network: Network, tmp_path: Path) -> None:
+    path = tmp_path / "weights.safetensors"
+    save_network(network, path)
+    tensors, metadata = read_tensors(path)
+    settings = json.loads(metadata["settings"]) | {"tube": "corners"}
+    write_tensors(tensors, metadata | {"settings": json.dumps(settings)}, path)
+    with pytest.raises(InputError, match=r"weights.safetensors holds .* another version.*corners"):
+        load_network(path)
+
+
+def test_how_much_is_looked_at_may_be_another_s(network: Network, tmp_path: Path) -> None:
+    path = tmp_path / "weights.safetensors"
+    save_network(network, path)
     asked = replace(network.settings, pillar_points=5, ego_pillars=9, point_hidden=99)
     again = load_network(path, effort=asked).settings
     assert (again.pillar_points, again.ego_pillars) == (5, 9)

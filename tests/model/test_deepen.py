@@ -43,35 +43,6 @@ def test_more_levels_change_nothing_until_they_learn(
         torch.testing.assert_close(new, old)
 
 
-def test_another_kind_of_tube_net_begins_anew_and_all_else_stays(
-    network: Network, frames: list[Frame]
-) -> None:
-    own = network.settings
-    changed = deepened(network, replace(own, tube="centroid")).eval()
-    assert changed.settings.tube == "centroid"
-    for old, new in zip(answers(network, frames), answers(changed, frames), strict=True):
-        assert torch.equal(new, old)
-    same, other = network.state_dict(), changed.state_dict()
-    kept = {name for name in same if name in other and torch.equal(same[name], other[name])}
-    assert all(name in kept for name in same if not name.startswith("tube_net."))
-    assert "tube_net.place.0.weight" not in kept
-
-
-def test_a_tube_net_that_asks_sides_begins_as_one_that_asks_edges(network: Network) -> None:
-    edges = build_network(replace(network.settings, tube="edges"), seed=7)
-    sides = deepened(edges, replace(network.settings, tube="sides"))
-    assert sides.settings.tube == "sides"
-    grown = sides.state_dict()
-    for name, values in edges.state_dict().items():
-        turns = 4 if name.startswith("tube_net.last.") else 0
-        assert torch.equal(values[turns:], grown[name][turns:])
-    assert {name for name in grown if name not in edges.state_dict()} == {
-        f"tube_net.{layer}.{kind}"
-        for layer in ("sides.say.0", "sides.say.2", "straight.sure")
-        for kind in ("weight", "bias")
-    }
-
-
 def test_a_tube_net_that_lays_over_begins_as_one_that_asks_sides(network: Network) -> None:
     sides = build_network(replace(network.settings, tube="sides"), seed=7)
     grown = deepened(sides, replace(network.settings, tube="overlap")).state_dict()

@@ -11,7 +11,7 @@ import torch
 from lidaraccum.data.frame import Frame
 from lidaraccum.geometry import rigid
 from lidaraccum.model.network import Network
-from lidaraccum.model.reader import MOST_TO_TRACK, NetworkReader, thinned
+from lidaraccum.model.reader import NetworkReader
 from lidaraccum.model.reading import WindowReading
 
 
@@ -130,12 +130,3 @@ def test_its_caller_keeps_his_threads(reader: NetworkReader, frames: list[Frame]
     torch.set_num_threads(2)
     reader.read(frames[0])
     assert torch.get_num_threads() == 2
-
-
-def test_small_objects_speak_with_all_points_large_ones_with_enough() -> None:
-    ids = np.random.default_rng(0).permutation(np.repeat([0, 3, 7, 8], [50, 40, 1000, 201]))
-    kept = thinned(ids)
-    assert ((kept == ids) | (kept == 0)).all()
-    counts = {one: int((kept == one).sum()) for one in (3, 7, 8)}
-    assert counts[3] == 40
-    assert all(MOST_TO_TRACK / 2 <= counts[one] <= MOST_TO_TRACK for one in (7, 8))

@@ -66,9 +66,6 @@ def trust_all_alike(edges: EdgeShift) -> None:
 def test_a_fresh_net_knows_how_far_a_car_seen_whole_has_gone(tube: str) -> None:
     settings = NetworkSettings(tube=tube)
     net = TubeNet(settings)
-    if tube == "centroid":
-        with torch.no_grad():
-            net.last.bias[7] = 1.0  # the whole gap
     tubes = tubes_of([car() + VELOCITY * 0.1 * time for time in range(4)])
     features = torch.zeros(800, settings.point_channels), torch.zeros(800, settings.base_widths[0])
     motion = net(tubes, *features).anchor_from_time[-1][0]
@@ -143,7 +140,7 @@ def test_who_is_not_seen_does_not_move() -> None:
 
 
 def test_steady_motion_stays_and_what_jumps_is_drawn_to_it() -> None:
-    straight = StraightOn(CHANNELS, askew=False)
+    straight = StraightOn(CHANNELS)
     tubes = tubes_of([car() + VELOCITY * 0.1 * time for time in range(5)])
     steady = -VELOCITY * 0.1 * torch.arange(5)[None, :, None]
     said = torch.zeros(1, 5, CHANNELS)
@@ -158,7 +155,7 @@ def test_steady_motion_stays_and_what_jumps_is_drawn_to_it() -> None:
 
 @pytest.mark.parametrize(("cost", "left"), [(-9.0, 0.1), (9.0, 0.9)])
 def test_what_the_anchor_alone_has_wrong_is_found_where_it_may_be(cost: float, left: float) -> None:
-    straight = StraightOn(CHANNELS, askew=True)
+    straight = StraightOn(CHANNELS)
     tubes = tubes_of([car() + VELOCITY * 0.1 * time for time in range(5)])
     steady = -VELOCITY * 0.1 * torch.arange(5)[None, :, None]
     askew = steady + torch.tensor([0.5, 0.0, 0.0])
@@ -173,6 +170,6 @@ def test_what_the_anchor_alone_has_wrong_is_found_where_it_may_be(cost: float, l
     assert error < left if cost < 0.0 else 0.5 < error < left
 
 
-def test_there_are_four_kinds() -> None:
-    with pytest.raises(SettingsError, match="centroid, edges, sides, overlap"):
+def test_there_are_two_kinds() -> None:
+    with pytest.raises(SettingsError, match="sides, overlap"):
         replace(NetworkSettings(), tube="corners")

@@ -56,7 +56,7 @@ def test_it_matches_as_many_pillars_as_the_first_or_as_it_is_told(
 def test_it_may_have_the_tube_net_of_others(files: list[Path], tmp_path: Path) -> None:
     """Of another kind than those of the weights that are averaged."""
     old = tmp_path / "old.safetensors"
-    save_network(build_network(replace(SMALL, tube="centroid"), 5), old)
+    save_network(build_network(replace(SMALL, tube="sides"), 5), old)
     mean = tmp_path / "mean.safetensors"
     assert average(files[0], old, output=mean).returncode != 0
     done = average(files[0], old, output=mean, more=("--tubes", str(files[1])))

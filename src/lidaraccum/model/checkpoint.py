@@ -12,7 +12,7 @@ import safetensors
 import torch
 from safetensors.torch import save
 
-from lidaraccum.errors import InputError, MissingInputError
+from lidaraccum.errors import InputError, MissingInputError, SettingsError
 from lidaraccum.model.network import Network
 from lidaraccum.model.settings import NetworkSettings
 from lidaraccum.model.unet import channels_last
@@ -20,7 +20,7 @@ from lidaraccum.model.unet import channels_last
 FORMAT = "lidaraccum-network-1"
 _SETTINGS = "settings"
 _METADATA = "lidaraccum"
-_UNSAID = {"pillar_points": 0, "tube": "centroid", "glance_odds": 1.0, "beside_odds": 1.0}
+_UNSAID = {"beside_odds": 1.0}
 """How a network was made whose file does not say so: it is older than the setting."""
 
 
@@ -70,7 +70,10 @@ def _settings(text: str, path: Path) -> NetworkSettings:
     if set(values) - known:
         unknown = ", ".join(sorted(set(values) - known))
         raise InputError(f"{path} was written by a newer version: {unknown} are unknown here")
-    return NetworkSettings(**(_UNSAID | values))
+    try:
+        return NetworkSettings(**(_UNSAID | values))
+    except SettingsError as error:
+        raise InputError(f"{path} holds a network of another version: {error}") from error
 
 
 def write_tensors(

@@ -17,8 +17,7 @@ from lidaraccum.model.unet import channels_last
 def deepened(network: Network, settings: NetworkSettings) -> Network:
     """A network with as many levels as the settings ask for, which says what this one says.
 
-    Where the settings ask for another kind of TubeNet, a fresh one takes the trained one's place;
-    only one that asks more than edges begins as the trained one, but for what that did not ask.
+    A TubeNet of another kind begins as the trained one, but for what that did not ask.
 
     Args:
         network: Trained. It is returned as it is where the settings ask for no more levels, or for
@@ -40,21 +39,12 @@ def deepened(network: Network, settings: NetworkSettings) -> Network:
     with torch.no_grad():
         grown.backbone.go_on_from(network.backbone)
         grown.motion_map.unet.go_on_from(network.motion_map.unet)
-        anew = ["backbone.", "motion_map.unet."]
-        if deeper.tube != own.tube and "centroid" in (deeper.tube, own.tube):
-            anew.append("tube_net.")
         rest = {
             name: values
             for name, values in network.state_dict().items()
-            if not name.startswith(tuple(anew))
-        }
-        turns = {
-            name: values[:4].clone() for name, values in grown.tube_net.last.named_parameters()
+            if not name.startswith(("backbone.", "motion_map.unet."))
         }
         grown.load_state_dict(rest, strict=False)
-        if deeper.tube_asks("sides") and not own.tube_asks("sides"):
-            for name, values in grown.tube_net.last.named_parameters():
-                values[:4] = turns[name]
     channels_last(grown)
     return grown
 

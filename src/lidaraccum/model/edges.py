@@ -141,18 +141,17 @@ class StraightOn(nn.Module):
     """Draws an object's shifts towards those of steady motion, as far as that is to be believed.
 
     Frames err each in its own way, and few objects change their speed within half a second. The
-    anchor's frame errs too: if ``askew``, what all others have in common beside their motion is
-    taken for its error, as far as it is learned that it may be.
+    anchor's frame errs too: what all others have in common beside their motion is taken for its
+    error, as far as it is learned that it may be.
     """
 
-    def __init__(self, channels: int, askew: bool) -> None:
+    def __init__(self, channels: int) -> None:
         super().__init__()
         self.say = nn.Linear(channels, 2)
-        self.sure = nn.Linear(channels, 1) if askew else None
+        self.sure = nn.Linear(channels, 1)
         for layer in (self.say, self.sure):
-            if layer is not None:
-                nn.init.zeros_(layer.weight)
-                nn.init.zeros_(layer.bias)
+            nn.init.zeros_(layer.weight)
+            nn.init.zeros_(layer.bias)
 
     def forward(self, tubes: Tubes, said: torch.Tensor, gone: torch.Tensor) -> torch.Tensor:
         """What to add (K, T, 3), metres, to how far objects have gone.
@@ -165,15 +164,14 @@ class StraightOn(nn.Module):
         count, drawn = self.say(said).sigmoid().unbind(dim=2)
         seconds = tubes.seconds_by_time()
         count = torch.where(tubes.fixed(), 0.0, count)
+        # Least squares of a steady motion and one shift of all, which costs its square.
+        cost = _SURE * self.sure(tubes.at_anchor(said))[:, 0].exp()
+        share = (count * seconds).sum(dim=1, keepdim=True)
+        share = share / (count.sum(dim=1, keepdim=True) + cost)
         ways = ((count * seconds)[..., None] * gone).sum(dim=1)
+        ways = ways - share * (count[..., None] * gone).sum(dim=1)
         spans = (count * seconds**2).sum(dim=1, keepdim=True)
-        if self.sure is not None:
-            # Least squares of a steady motion and one shift of all, which costs its square.
-            cost = _SURE * self.sure(tubes.at_anchor(said))[:, 0].exp()
-            share = (count * seconds).sum(dim=1, keepdim=True)
-            share = share / (count.sum(dim=1, keepdim=True) + cost)
-            ways = ways - share * (count[..., None] * gone).sum(dim=1)
-            spans = spans - share * (count * seconds).sum(dim=1, keepdim=True)
+        spans = spans - share * (count * seconds).sum(dim=1, keepdim=True)
         velocity = ways / (spans + 1e-6)
         return drawn[..., None] * (velocity[:, None] * seconds[..., None] - gone)
 

@@ -219,10 +219,8 @@ class Network(nn.Module):
         frame = perception.frame[chosen]
         time = frame - first[of_frame[frame]]
         window = torch.zeros_like(ids).index_copy(0, row, of_frame[frame])
-        shown = torch.arange(len(chosen), device=device)
-        if self.settings.tube_asks("sides"):
-            slot = row * max(lengths) + time
-            shown = one_of_each_cell(perception.position[chosen], slot, TUBE_CELL_M)
+        slot = row * max(lengths) + time
+        shown = one_of_each_cell(perception.position[chosen], slot, TUBE_CELL_M)
         asked = chosen[shown]
         tubes = gather_tubes(
             perception.position[asked],

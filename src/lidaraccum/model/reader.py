@@ -28,13 +28,6 @@ FEWEST_POINTS = 50
 """A frame with fewer points on the grid has nothing to say."""
 
 
-MOST_TO_TRACK = 200
-"""So many points of an object speak for its motion in a frame; of more, every second or third.
-
-A TubeNet that thins them by place, to more where there is more to see, is given all.
-"""
-
-
 @dataclass(frozen=True, eq=False)
 class EncodedFrame:
     """A frame as the network keeps it, encoded once.
@@ -161,11 +154,9 @@ class NetworkReader:
         seen, places = kept.perception, list(kept.places)
         frame, rows = to_indices(seen.frame), to_indices(kept.features.frames.rows[seen.point])
         ids = np.zeros(len(rows), dtype=np.int64)
-        thins = self._network.settings.tube_asks("sides")
         for order, place in enumerate(places):
             own = frame == order
-            named = instances[place][rows[own]]
-            ids[own] = named if thins else thinned(named)
+            ids[own] = instances[place][rows[own]]
         if not ids.any():
             return self.track(replace(reading, kept=None), instances)
         with _answering():
@@ -193,15 +184,6 @@ def _answering() -> Iterator[None]:
             yield
     finally:
         torch.set_num_threads(threads)
-
-
-def thinned(ids: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Ids (Q,) of points, 0 for none, with 0 for those that are not needed to track an object."""
-    kept = np.zeros_like(ids)
-    for one, count in zip(*np.unique(ids[ids > 0], return_counts=True), strict=True):
-        own = np.flatnonzero(ids == one)
-        kept[own[:: -(-count // MOST_TO_TRACK)]] = one
-    return kept
 
 
 def _sensor_from_level(features: FrameFeatures, order: int) -> rigid.Pose:

@@ -15,8 +15,8 @@ EFFORT = (
 )  # fmt: skip
 """Settings that say how much is looked at. Weights fit any, best those they learned with."""
 
-TUBES = ("centroid", "edges", "sides", "overlap")
-"""Kinds of TubeNet: from edges on each asks all that those before it ask, and one thing more."""
+TUBES = ("sides", "overlap")
+"""Kinds of TubeNet: the second asks all that the first asks, and one thing more."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +59,8 @@ class NetworkSettings:
         motion_widths: Channels of the motion U-Net by level, from half resolution on; the first
             is that of the motion features.
         point_channels: Channels of a point's motion features.
-        tube: How an object's motion is had, one of `TUBES`: as a share of the gap between its
-            centroids; by its edges; by its sides, too, of its points thinned to one of each cell;
-            and by how much of it then overlaps with itself; see `model.tube_net`.
+        tube: How an object's motion is had, one of `TUBES`: by its sides and edges, or by how much
+            of it then overlaps with itself, too; see `model.tube_net`.
         tube_channels: Channels of what TubeNet says of an object's positions in one frame.
     """
 
@@ -110,10 +109,6 @@ class NetworkSettings:
         if self.lowest_m >= self.highest_m:
             raise SettingsError("lowest_m must be below highest_m")
         self.cells(self.extent_m)
-
-    def tube_asks(self, kind: str) -> bool:
-        """Whether TubeNet asks what one of `TUBES` is named after: it asks all up to its own."""
-        return TUBES.index(self.tube) >= TUBES.index(kind)
 
     def with_effort(self, other: NetworkSettings) -> NetworkSettings:
         """These settings with another's `EFFORT`."""

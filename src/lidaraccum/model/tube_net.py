@@ -54,10 +54,8 @@ class TubeNet(nn.Module):
 
     Ours: the turn is what the object's sides say, plus a correction; the shift is what its edges
     and its centroid say, once it is turned, weighted, plus a correction, and drawn towards steady
-    motion; at last the object is laid over itself along that way. The net is told from where the
-    object is seen. With ``tube = "sides"`` nothing is laid over; with ``"edges"`` sides are not
-    asked; with ``"centroid"`` the shift is a share of the gap between the centroids plus a
-    correction.
+    motion; at last the object is laid over itself along that way, unless ``tube = "sides"``. The
+    net is told from where the object is seen.
 
     Source: the paper, section 3.5 and supplement.
     """
@@ -65,7 +63,6 @@ class TubeNet(nn.Module):
     def __init__(self, settings: NetworkSettings) -> None:
         super().__init__()
         wide = settings.tube_channels
-        by_edges = settings.tube_asks("edges")
         self.motion = nn.Sequential(linear(settings.point_channels, 64), nn.ReLU(inplace=True))
         self.ego = nn.Sequential(linear(settings.base_widths[0], 64), nn.ReLU(inplace=True))
         self.place = nn.Sequential(
@@ -77,20 +74,20 @@ class TubeNet(nn.Module):
         )
         # Normalised, for what comes in is metres: unbounded signals had killed every unit.
         self.regress = nn.Sequential(
-            linear(128 + 2 * wide + (12 if by_edges else 4), 256),
+            linear(128 + 2 * wide + 12, 256),
             nn.LayerNorm(256),
             nn.ReLU(inplace=True),
             linear(256, _SAID),
             nn.LayerNorm(_SAID),
             nn.ReLU(inplace=True),
         )
-        self.last = nn.Linear(_SAID, 7 if by_edges else 8)
+        self.last = nn.Linear(_SAID, 7)
         nn.init.normal_(self.last.weight, std=1e-5)
         nn.init.zeros_(self.last.bias)  # the identity: see `_identity`
-        self.edges = EdgeShift(_SAID) if by_edges else None
-        self.straight = StraightOn(_SAID, settings.tube_asks("sides")) if by_edges else None
-        self.sides = SideTurn(_SAID) if settings.tube_asks("sides") else None
-        self.overlap = Overlap(_SAID) if settings.tube_asks("overlap") else None
+        self.edges = EdgeShift(_SAID)
+        self.straight = StraightOn(_SAID)
+        self.sides = SideTurn(_SAID)
+        self.overlap = Overlap(_SAID) if settings.tube == "overlap" else None
 
     def forward(self, tubes: Tubes, motion: torch.Tensor, base: torch.Tensor) -> TubeMotions:
         """Motions of K objects, from features (Q, D) and (Q, C) of their points."""
@@ -132,7 +129,7 @@ class TubeNet(nn.Module):
         """Quaternion (K, T, 4) and shift (K, T, 3) of this iteration, and what led to them."""
         count, span = tubes.counts.shape
         moved = move_points(total, tubes)
-        gone = total[..., :3, 3] if self.sides is None else _gone(moved, tubes)
+        gone = _gone(moved, tubes)
         place = self.place(torch.cat([moved / LENGTH_M, tubes.seconds[:, None]], dim=1))
         summary = tallest(torch.relu(place), tubes.slot(), count * span).view(count, span, -1)
         gap = centroid_gap(moved, tubes)
@@ -143,31 +140,21 @@ class TubeNet(nn.Module):
             tubes.at_anchor(summary).expand(-1, span, -1),
             ahead[..., None].float() / span,
             gap / LENGTH_M,
+            *_circumstances(tubes, gone),
         ]
-        if self.edges is not None:
-            known += _circumstances(tubes, gone)
         said = self.regress(torch.cat(known, dim=2))
         numbers = self.last(said)
         fixed = tubes.fixed()[..., None]
         regressed = torch.where(fixed, 0.0, numbers[..., :4])
-        if self.edges is None or self.straight is None:
-            quaternion = _identity(numbers) + regressed
-            shift = numbers[..., 4:7] + numbers[..., 7:] * gap
-        elif self.sides is None:
-            quaternion = _identity(numbers) + regressed
-            shift = numbers[..., 4:] + self.edges(tubes, said, moved, gone)
-            whole = move(compose(rotation_of(quaternion), shift), gone[:, :, None])[:, :, 0]
-            shift = shift + self.straight(tubes, said, whole)
-        else:
-            # Without its own real part: that grew, and drowned what was to be turned.
-            quaternion = about_vertical(self.sides(tubes, said, moved))
-            quaternion = quaternion + nn.functional.pad(regressed[..., 1:], (1, 0))
-            turn = rotation_of(quaternion)
-            turned, aside = turn_in_place(turn, moved, tubes)
-            shift = numbers[..., 4:] + self.edges(tubes, said, turned, gone)
-            bend = bend_of(turn @ total[..., :3, :3])
-            straightened = unbent(gone + shift, bend)
-            shift = aside + shift + bent(self.straight(tubes, said, straightened), bend)
+        # Without its own real part: that grew, and drowned what was to be turned.
+        quaternion = about_vertical(self.sides(tubes, said, moved))
+        quaternion = quaternion + nn.functional.pad(regressed[..., 1:], (1, 0))
+        turn = rotation_of(quaternion)
+        turned, aside = turn_in_place(turn, moved, tubes)
+        shift = numbers[..., 4:] + self.edges(tubes, said, turned, gone)
+        bend = bend_of(turn @ total[..., :3, :3])
+        straightened = unbent(gone + shift, bend)
+        shift = aside + shift + bent(self.straight(tubes, said, straightened), bend)
         return quaternion, torch.where(fixed, 0.0, shift), said
 
     def _lay_over(
