@@ -32,9 +32,6 @@ OUTLASTS_BY = 2
 LOW_SHARE = 0.4
 """Points above this share of the least height count as partners and join what stands on them."""
 
-FOOT_SHARE = 0.28
-"""Points above this share of it are what something stands on, where anything stands beside them."""
-
 
 class SightedFrame:
     """A frame's obstacles (all but ground, sky and the carrier) and what other frames saw there.
@@ -46,7 +43,8 @@ class SightedFrame:
         view: What its rays passed through.
         rows: (M,) int64: the obstacles' rows among the frame's points.
         low_rows: (L,) int64: rows of points lower than obstacles but above the ground.
-        foot_rows: (F,) int64: the same, down to where the ground itself may be.
+        ground_rows: (G,) int64: the same and the ground itself.
+        ground_heights: (G,) metres, theirs.
         close_rows: (C,) int64: rows of points that stand so close that they may be the carrier.
         near_points: (M + L, 3) float64, metres, sensor coordinates: obstacles, then low points.
         near_heights: (M + L,) metres above the ground.
@@ -83,7 +81,8 @@ class SightedFrame:
         self.rows = np.flatnonzero(standing & obstacle)
         low = standing & ~obstacle
         self.low_rows = np.flatnonzero(low & (heights > LOW_SHARE * settings.min_height_m))
-        self.foot_rows = np.flatnonzero(low & (heights > FOOT_SHARE * settings.min_height_m))
+        self.ground_rows = np.flatnonzero(low)
+        self.ground_heights = heights.take(self.ground_rows)
         self.close_rows = np.flatnonzero(
             ~outside & low_enough & obstacle & (squared > MIN_RANGE_M**2)
         )
@@ -227,9 +226,10 @@ class SightedFrame:
         return rigid.transform(self.world_from_sensor, self.close_points)
 
     @cached_property
-    def feet(self) -> NDArray[np.float64]:
-        """(F, 3) the points of ``foot_rows``, metres, sensor coordinates."""
-        return _picked(self.registered.frame.points, self.foot_rows)
+    def ground(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """x and y (G,) each of ``ground_rows``, metres, sensor coordinates."""
+        x, y = self.registered.frame.points.T[:2].take(self.ground_rows, axis=1)
+        return x, y
 
     def watch(self, other: SightedFrame) -> None:
         """Count what this frame saw at the other frame's obstacles."""

@@ -20,6 +20,16 @@ from lidaraccum.pipeline.shape import ObjectShape
 FOOT_REACH_M = 0.2
 """Low points this near to an object's obstacles, seen from above, are its wheels and shoes."""
 
+ROUND_M = (0.3, 1.0)
+ROUND_LEAST = 10
+ROUND_SHARE = 0.9
+STANDS_OUT_M = 0.01
+FOOT_M = (0.05, 0.1)
+UNTOLD_FOOT_M = 0.07
+"""If they stand out of the ground round the object: between such distances from it this share of
+the ground lies lower by so much. Nowhere is this asked to be less or more; where the ground there
+shows fewer points, it is that."""
+
 MOST_MISSED = 1.5
 """A frame that shows less of a mover than its fullest is filled up as if it showed so many times
 what it does: it may have missed some, a wall beside it is more."""
@@ -97,13 +107,23 @@ class Canvas:
         )
 
     def _feet_of(self, picked: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Rows of the low points beside obstacles (K,)."""
+        """Rows of the low points beside obstacles (K,) that stand out of the ground there."""
         frame = self._frame
-        low, own = frame.feet[:, :2], frame.points[picked, :2]
-        inside = (low > own.min(axis=0) - FOOT_REACH_M) & (low < own.max(axis=0) + FOOT_REACH_M)
-        beside = np.flatnonzero(inside.all(axis=1))
-        distance, _ = cKDTree(own).query(low[beside], distance_upper_bound=FOOT_REACH_M)
-        return frame.foot_rows[beside[np.isfinite(distance)]]
+        (x, y), own = frame.ground, frame.points[picked, :2]
+        (west, south), (east, north) = own.min(axis=0) - ROUND_M[1], own.max(axis=0) + ROUND_M[1]
+        about = np.flatnonzero((x > west) & (x < east) & (y > south) & (y < north))
+        places = np.column_stack([x[about], y[about]])
+        distance, _ = cKDTree(own).query(places, distance_upper_bound=ROUND_M[1])
+        heights = frame.ground_heights[about]
+        foot = heights > _foot_height(heights[(distance > ROUND_M[0]) & np.isfinite(distance)])
+        return frame.ground_rows[about[foot & (distance < FOOT_REACH_M)]]
+
+
+def _foot_height(ground: NDArray[np.float64]) -> float:
+    """Above which height, metres, a point is no ground, by heights (G,) of the ground round it."""
+    if len(ground) < ROUND_LEAST:
+        return UNTOLD_FOOT_M
+    return float(np.clip(np.quantile(ground, ROUND_SHARE) + STANDS_OUT_M, *FOOT_M))
 
 
 def paint_mover(track: Track, frame: SightedFrame, canvas: Canvas, box_growth: float) -> None:
