@@ -227,7 +227,7 @@ class SightedFrame:
 
     @cached_property
     def ground(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """x and y (G,) each of ``ground_rows``, metres, sensor coordinates."""
+        """The level places of ``ground_rows``, x (G,) and y (G,), metres, sensor coordinates."""
         x, y = self.registered.frame.points.T[:2].take(self.ground_rows, axis=1)
         return x, y
 
