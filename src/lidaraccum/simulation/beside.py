@@ -16,13 +16,10 @@ from lidaraccum.simulation.furniture import (
     FURNITURE,
     billboard,
     bus_stop,
-    clutter,
     container,
-    goods,
     kiosk,
-    statue,
 )
-from lidaraccum.simulation.growth import clipped, wild_hedge
+from lidaraccum.simulation.growth import wild_hedge
 from lidaraccum.simulation.mesh import Finish, Mesh, box
 from lidaraccum.simulation.roads import Path
 from lidaraccum.simulation.site import Maker, Site
@@ -38,7 +35,8 @@ EGO_HALF_M = 1.1
 EVERY_M = 20.0
 AHEAD_M, BEHIND_M = 14.0, 8.0
 """Of the stretch that the ego drives, they stand so far beyond its ends too."""
-
+LONGER_M, TALLER_M = 5.5, 2.4
+"""What cannot move is the one or the other: what is as large as a car and near should be a car."""
 
 ANYWHERE_M = -50.0
 """A margin to the carriageway that lets things stand on it."""
@@ -57,10 +55,7 @@ def house_front(rng: np.random.Generator) -> Mesh:
     return house.moved((0.0, -0.5 * depth, 0.0))
 
 
-STANDING: tuple[Maker, ...] = (
-    container, kiosk, kiosk, bus_stop, billboard, goods, statue, clutter, clutter, clipped, pier,
-    pier, house_front, house_front,
-)  # fmt: skip
+STANDING: tuple[Maker, ...] = (container, kiosk, bus_stop, billboard, pier, house_front)
 LINES = (BARRIERS["wall"], BARRIERS["noise_wall"], BARRIERS["boards"], hedge, wild_hedge)
 
 
@@ -100,14 +95,15 @@ def _leave(site: Site, way: Path, along: float, lateral: float) -> None:
 def _stand(site: Site, way: Path, along: float, lateral: float) -> None:
     """Something that is not movable, a side of it towards the way."""
     rng = site.rng
-    maker = STANDING[int(rng.integers(len(STANDING)))]
-    if maker in FURNITURE and not site.furniture:
-        return
-    mesh = site.some(maker)(rng)
-    low, high = (corner[:2] for corner in mesh.bounds)
+    makers = [one for one in STANDING if site.furniture or one not in FURNITURE]
+    size: Array = np.zeros(3)
+    while max(size[:2]) < LONGER_M and size[2] < TALLER_M:
+        mesh = site.some(makers[int(rng.integers(len(makers)))])(rng)
+        low, high = mesh.bounds
+        size, middle = high - low, -0.5 * (low + high)
     quarter = int(rng.integers(4))
-    length, width = (high - low)[:: 1 if quarter % 2 == 0 else -1]
-    mesh = mesh.moved((*(-0.5 * (low + high)), 0.0))
+    length, width = size[:2][:: 1 if quarter % 2 == 0 else -1]
+    mesh = mesh.moved((middle[0], middle[1], 0.0))
     place, heading = way.at(along, lateral + np.sign(lateral) * 0.5 * width)
     yaw = float(heading)
     if _keeps_clear(way, place, yaw, float(length), float(width)):
