@@ -99,7 +99,7 @@ def _stand(site: Site, way: Path, along: float, lateral: float) -> None:
     size: Array = np.zeros(3)
     while max(size[:2]) < LONGER_M and size[2] < TALLER_M:
         mesh = site.some(makers[int(rng.integers(len(makers)))])(rng)
-        low, high = mesh.bounds
+        low, high = np.asarray(mesh.bounds, dtype=np.float64)
         size, middle = high - low, -0.5 * (low + high)
     quarter = int(rng.integers(4))
     length, width = size[:2][:: 1 if quarter % 2 == 0 else -1]
