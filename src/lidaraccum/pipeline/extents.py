@@ -142,6 +142,12 @@ def width_across(points: NDArray[np.float64], velocity: NDArray[np.float64]) -> 
     return width(course.places(points))
 
 
+def is_vehicle_sized(points: NDArray[np.float64], velocity: NDArray[np.float64]) -> bool:
+    """Whether points (N, 3), world, that go with a velocity (3,), are no more than a vehicle."""
+    long, wide = length_along(points, velocity), width_across(points, velocity)
+    return long <= LONGEST_M and wide <= WIDEST_M
+
+
 def width(places: NDArray[np.float64]) -> float:
     """How wide, metres, points at places (N, 2) are across, however askew they may lie."""
     across = places @ np.stack([np.sin(SKEW_RAD), np.cos(SKEW_RAD)])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from lidaraccum.pipeline.courses import are_alike
-from lidaraccum.pipeline.extents import LONGEST_M, WIDEST_M, length_along, width_across
+from lidaraccum.pipeline.extents import LONGEST_M, is_vehicle_sized, length_along
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.motion_settings import MotionSettings
 from lidaraccum.pipeline.objects import TEMPLATE_POINTS, WindowObject
@@ -95,7 +95,7 @@ def _is_one(
     for frame in frames:
         if len(whole.of(frame)):
             points, ahead = frame.world(whole.of(frame)), part.velocity_at(frame.stamp)
-            if length_along(points, ahead) > LONGEST_M or width_across(points, ahead) > WIDEST_M:
+            if not is_vehicle_sized(points, ahead):
                 return False
     template = template_of(own, rest[own.index], TEMPLATE_POINTS)
     rivals = np.stack([np.zeros(3), part.velocity_at(own.stamp)])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lidaraccum.pipeline.advice import Leads, no_leads
 from lidaraccum.pipeline.carrier import is_carrier
 from lidaraccum.pipeline.courses import are_alike, way
-from lidaraccum.pipeline.extents import Motion
+from lidaraccum.pipeline.extents import Motion, is_vehicle_sized
 from lidaraccum.pipeline.freespace import SightedFrame
 from lidaraccum.pipeline.gathering import MOST_GROWTH, WHOLE_GROWTH
 from lidaraccum.pipeline.hypotheses import propose
@@ -92,6 +92,8 @@ def find_objects(
             if found is None:  # its proposer may be right that it moves and wrong how
                 proposals = propose(lead.suspect, suspects, frames, settings)
                 found = explain(lead.suspect, proposals, frames, trusting, first=first)
+                if found is not None and not _may_be(found, frames, settings):
+                    found = None
             if found is not None:
                 # What the points are sure of is more than its proposer's outline.
                 is_sure = found.margin > settings.sure_margin and not found.unseen
@@ -102,6 +104,16 @@ def find_objects(
     others = _without_carrier(movers, frames, settings)
     whole = complete(join_parts(others, frames, settings), sure, frames, settings)
     return [_filled(one, frames) for one in _without_carrier(whole, frames, settings)]
+
+
+def _may_be(found: WindowObject, frames: Sequence[SightedFrame], settings: MotionSettings) -> bool:
+    """Whether a mover that shows too little for itself, and goes otherwise than it was said to.
+
+    It must at least be of a vehicle's size in the frame that shows most of it.
+    """
+    fullest = max(frames, key=lambda frame: len(found.of(frame)))
+    places, ahead = fullest.world(found.of(fullest)), found.velocity_at(fullest.stamp)
+    return found.margin > settings.margin or is_vehicle_sized(places, ahead)
 
 
 def _without_carrier(
