@@ -92,8 +92,8 @@ def find_objects(
             if found is None:  # its proposer may be right that it moves and wrong how
                 proposals = propose(lead.suspect, suspects, frames, settings)
                 found = explain(lead.suspect, proposals, frames, trusting, first=first)
-                if found is not None and not _may_be(found, frames, settings):
-                    found = None
+                if found is not None and found.margin < settings.margin:
+                    found = found if _is_vehicle_sized(found, frames) else None
             if found is not None:
                 # What the points are sure of is more than its proposer's outline.
                 is_sure = found.margin > settings.sure_margin and not found.unseen
@@ -106,14 +106,10 @@ def find_objects(
     return [_filled(one, frames) for one in _without_carrier(whole, frames, settings)]
 
 
-def _may_be(found: WindowObject, frames: Sequence[SightedFrame], settings: MotionSettings) -> bool:
-    """Whether a mover that shows too little for itself, and goes otherwise than it was said to.
-
-    It must at least be of a vehicle's size in the frame that shows most of it.
-    """
+def _is_vehicle_sized(found: WindowObject, frames: Sequence[SightedFrame]) -> bool:
+    """Whether a mover is no more than a vehicle in the frame that shows most of it."""
     fullest = max(frames, key=lambda frame: len(found.of(frame)))
-    places, ahead = fullest.world(found.of(fullest)), found.velocity_at(fullest.stamp)
-    return found.margin > settings.margin or is_vehicle_sized(places, ahead)
+    return is_vehicle_sized(fullest.world(found.of(fullest)), found.velocity_at(fullest.stamp))
 
 
 def _without_carrier(
