@@ -79,10 +79,10 @@ class SightedFrame:
         standing = outside & low_enough
         obstacle = heights >= settings.min_height_m
         self.rows = np.flatnonzero(standing & obstacle)
-        low = standing & ~obstacle
-        self.low_rows = np.flatnonzero(low & (heights > LOW_SHARE * settings.min_height_m))
-        self.ground_rows = np.flatnonzero(low)
+        self.ground_rows = np.flatnonzero(standing & ~obstacle)
         self.ground_heights = heights.take(self.ground_rows)
+        is_low = self.ground_heights > LOW_SHARE * settings.min_height_m
+        self.low_rows = self.ground_rows[is_low]
         self.close_rows = np.flatnonzero(
             ~outside & low_enough & obstacle & (squared > MIN_RANGE_M**2)
         )
